@@ -1,0 +1,1 @@
+"""LbW minimal: the paper's method. It knows images, keypoints and actions, and nothing of the simulator."""

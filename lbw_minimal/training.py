@@ -1,0 +1,129 @@
+"""What every training shares: device, seeds, atomic files, checkpoint and resume, a log.
+
+In: a nested state of dicts, lists, numbers and tensors. Out: one safetensors file that is either
+the old one or the new one, never half of one, and from which nothing is ever unpickled.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import torch
+from safetensors import SafetensorError, safe_open
+from safetensors.torch import save
+from tqdm import tqdm
+
+
+class InputError(ValueError):
+    """A mistake in what the user gave: one sentence that names the thing and the remedy."""
+
+
+def pick_device(name: str = "cpu") -> torch.device:
+    """Torch device of that name. Raises InputError if the machine has no such device."""
+    if name.startswith("cuda") and not torch.cuda.is_available():
+        raise InputError(f"--device {name}: this machine has no CUDA device; use --device cpu.")
+    try:
+        return torch.device(name)
+    except RuntimeError:
+        raise InputError(f"--device {name}: torch knows no such device; use cpu or cuda.") from None
+
+
+def seed_everything(seed: int) -> np.random.Generator:
+    """Seed torch and return a NumPy generator of the same seed."""
+    torch.manual_seed(seed)
+    return np.random.default_rng(seed)
+
+
+def write_atomic(path: Path | str, data: bytes | str) -> None:
+    """Write a file so that a kill at any moment leaves the old file or the new one."""
+    path = Path(path)
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    with open(part, "wb") as f:
+        f.write(data.encode() if isinstance(data, str) else data)
+        f.flush()
+        os.fsync(f.fileno())  # without it a power cut can rename an empty file into place
+    os.replace(part, path)
+
+
+def _flatten(state, name, tensors):
+    if isinstance(state, dict):
+        # Optimizers key their state by integers, JSON keys are strings: keep each key's type.
+        return {"dict": [[k, _flatten(v, f"{name}/{k}", tensors)] for k, v in state.items()]}
+    if isinstance(state, list | tuple):
+        return {"list": [_flatten(v, f"{name}/{i}", tensors) for i, v in enumerate(state)]}
+    if isinstance(state, np.ndarray):
+        state = torch.from_numpy(state)
+    if isinstance(state, torch.Tensor):
+        tensors[name] = state.detach().cpu().contiguous().clone()
+        return {"tensor": name}
+    return {"value": state}
+
+
+def _unflatten(tree, tensors):
+    kind, content = next(iter(tree.items()))
+    if kind == "dict":
+        return {k: _unflatten(v, tensors) for k, v in content}
+    if kind == "list":
+        return [_unflatten(v, tensors) for v in content]
+    return tensors[content] if kind == "tensor" else content
+
+
+def save_state(path: Path | str, state: dict) -> None:
+    """Save nested dicts, lists, JSON values, arrays and tensors as one safetensors file, atomically."""
+    tensors: dict[str, torch.Tensor] = {}
+    tree = _flatten(state, "", tensors)
+    write_atomic(path, save(tensors, metadata={"tree": json.dumps(tree)}))
+
+
+def load_state(path: Path | str) -> dict:
+    """What `save_state` wrote; arrays come back as tensors, tuples as lists.
+
+    Raises InputError if the file is missing, cut short, or not written by `save_state`.
+    """
+    if not Path(path).is_file():
+        raise InputError(f"{path}: there is no such file; train first or give another path.")
+    try:
+        with safe_open(str(path), "pt") as f:
+            tensors = {k: f.get_tensor(k) for k in f.keys()}  # noqa: SIM118 (not a dict)
+            tree = json.loads(f.metadata()["tree"])
+    except (SafetensorError, KeyError, TypeError, ValueError):
+        raise InputError(f"{path}: not a complete weights file; delete it and train again.") from None
+    return _unflatten(tree, tensors)
+
+
+class Checkpoint:
+    """One training's state on disk, saved at most every `seconds`, so that a kill costs no more.
+
+    `path` None switches it off: the same loop then runs without a file.
+    """
+
+    def __init__(self, path: Path | str | None, seconds: float = 20.0):
+        self.path = Path(path) if path else None
+        self.seconds = seconds
+        self._last = time.monotonic()
+
+    def load(self) -> dict | None:
+        """The saved state with torch's random state restored, or None where there is none."""
+        if self.path is None or not self.path.exists():
+            return None
+        saved = load_state(self.path)
+        torch.set_rng_state(saved["torch_rng"])
+        return saved["state"]
+
+    def save(self, make_state, force: bool = False) -> None:
+        """Call `make_state()` and save it, if `seconds` have passed or `force` asks for it."""
+        if self.path is None or not (force or time.monotonic() - self._last > self.seconds):
+            return
+        save_state(self.path, {"state": make_state(), "torch_rng": torch.get_rng_state()})
+        self._last = time.monotonic()
+
+
+def progress(total: int, name: str, start: int = 0):
+    """A tqdm bar on stderr that also reads well in a log file."""
+    live = sys.stderr.isatty()
+    return tqdm(total=total, initial=start, desc=name, mininterval=0.3 if live else 15, ncols=100)

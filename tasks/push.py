@@ -1,0 +1,61 @@
+"""Push: a cube lies on the table, and its centre has to end at the target 16 cm further on.
+
+Success, horizon and sizes follow the Fetch push task the paper builds on; the cube is red as in the
+paper's Figure 4. From top to bottom: constants, scene, success, the expert, the recipe.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from lbw_minimal.imitate import Recipe
+from tasks.world import GREEN, RED, TaskEnv
+
+HORIZON = 50  # control steps: 2 s
+CUBE = 0.05  # m, edge
+CUBE_MASS = 0.4  # kg; a 0.2 kg cube shoots away when it is pinched from above
+CUBE_FRICTION = 0.6  # at 1.0 a push at half its height tips it over
+CUBE_START = 0.53  # m, along x
+TARGET = 0.68  # m, along x: 15 cm further
+SCATTER = (0.50, 0.70)  # m, where random data puts the cube
+SUCCESS = 0.05  # m, distance from cube to target
+FINGER = 0.012  # m, half the thickness of gripper and fingers: what the tip stands behind the cube's face
+
+
+class Push(TaskEnv):
+    __doc__ = __doc__
+
+    def build(self):
+        self.cube = self.world.box((CUBE / 2,) * 3, (CUBE_START, 0, CUBE / 2), RED, mass=CUBE_MASS)
+        self.world.p.changeDynamics(self.cube, -1, lateralFriction=CUBE_FRICTION)
+        self.world.cylinder(0.03, 0.002, self.target_position() * (1, 1, 0), GREEN, solid=False)
+
+    def place(self, offset, scatter):
+        position = np.array([CUBE_START, 0, CUBE / 2]) + offset
+        if scatter:
+            tip = self.arm.goal[0]
+            position[0] = self.np_random.uniform(*SCATTER)
+            if abs(position[0] - tip) < CUBE / 2 + 2 * FINGER and self.arm.goal[2] < CUBE + 0.02:
+                position[0] = SCATTER[0] if tip > sum(SCATTER) / 2 else SCATTER[1]
+        self.world.p.resetBasePositionAndOrientation(self.cube, position, (0, 0, 0, 1))
+
+    def object_position(self):
+        return np.array(self.world.p.getBasePositionAndOrientation(self.cube)[0])
+
+    def target_position(self):
+        return np.array([TARGET, 0, CUBE / 2])
+
+    def is_success(self):
+        return np.linalg.norm(self.object_position() - self.target_position()) < SUCCESS
+
+    def waypoints(self):
+        behind = CUBE / 2 + FINGER
+        x, y = self.object_position()[0], 0.0
+        return [
+            (np.array([x - behind - 0.025, y, 0.02]), 0.6),
+            (np.array([TARGET - behind, y, 0.02]), 0.8),
+            (np.array([TARGET - behind, y, 0.02]), 0.2),  # the tip lags its goal by 2 / 20 s
+        ]
+
+
+RECIPE = Recipe(human_frames=398, robot_frames=1220)

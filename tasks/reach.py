@@ -1,0 +1,42 @@
+"""Reach: a target hangs over the table, and the tip of the arm has to come within 5 cm of it.
+
+Success and horizon follow the Fetch reach task the paper builds on. From top to bottom: constants,
+scene, success, the expert, the recipe.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from lbw_minimal.imitate import Recipe
+from tasks.world import GREEN, TaskEnv
+
+HORIZON = 50  # control steps: 2 s
+RADIUS = 0.018  # m, the ball that marks the target; it cannot be touched
+TARGET = (0.68, 0.0, 0.06)  # m
+SUCCESS = 0.05  # m, distance from tip to target
+
+
+class Reach(TaskEnv):
+    __doc__ = __doc__
+
+    def build(self):
+        self.ball = self.world.sphere(RADIUS, TARGET, GREEN, solid=False)
+
+    def place(self, offset, scatter):
+        """The target stands still, in random data too: only the arm moves in this task."""
+
+    def object_position(self):
+        return self.arm.tip_pose()[0]
+
+    def target_position(self):
+        return np.array(TARGET)
+
+    def is_success(self):
+        return np.linalg.norm(self.arm.tip_pose()[0] - TARGET) < SUCCESS
+
+    def waypoints(self):
+        return [(np.array(TARGET), 1.0)]
+
+
+RECIPE = Recipe(human_frames=1056, robot_frames=3150)

@@ -1,0 +1,288 @@
+"""What the five tasks share: table, wall, camera, light, the arm, and Gymnasium's reset, step, render.
+
+A task file subclasses `TaskEnv` and says what stands on the table, when it is done, and how an expert
+does it. The camera looks from the side along y: x goes right in the image, z up. Lengths in metres.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import os
+import sys
+
+import cv2
+import gymnasium as gym
+import numpy as np
+
+
+@contextlib.contextmanager
+def _silence():
+    """PyBullet prints a line from C when it is imported, and one for every client."""
+    sys.stdout.flush()
+    keep, null = (os.dup(1), os.dup(2)), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, 1)
+    os.dup2(null, 2)
+    try:
+        yield
+    finally:
+        ctypes.CDLL(None).fflush(None)  # C still holds the line when stdout is a file
+        for stream, copy in enumerate(keep, start=1):
+            os.dup2(copy, stream)
+            os.close(copy)
+        os.close(null)
+
+
+with _silence():
+    import pybullet
+    from pybullet_utils.bullet_client import BulletClient
+
+from tasks.arm import Arm  # noqa: E402 (after the silenced import)
+
+SIZE = 84  # pixels, both sides of every frame
+SUPERSAMPLE = 2  # the renderer does not smooth edges; averaging lets a frame show motion below a pixel
+DT = 1 / 250  # s, one simulation step
+SUBSTEPS = 10  # simulation steps per control step: 25 Hz
+TABLE_FRICTION = 1.0  # Bullet multiplies it with the object's own
+
+# Tight framing: half a metre fills the image, so a 5 cm object is 8 pixels wide.
+CAMERA_TARGET, CAMERA_DISTANCE = (0.56, 0.0, 0.145), 1.15  # m
+CAMERA_PITCH, CAMERA_FOV = -12.0, 25.0  # degrees
+
+RED, GREEN = (0.78, 0.12, 0.10, 1), (0.15, 0.60, 0.25, 1)
+# Middle tones: a tanh decoder saturates on white, and translation swaps extreme wall and table tones.
+LOOKS = {
+    "robot": {"wall": (0.56, 0.60, 0.64, 1), "table": (0.36, 0.38, 0.42, 1), "light": (0.3, -1.0, 1.6)},
+    "human": {"wall": (0.68, 0.63, 0.54, 1), "table": (0.50, 0.36, 0.25, 1), "light": (-0.5, -1.0, 1.4)},
+}
+
+
+class World:
+    """One PyBullet client with wall and table, its camera, and the shapes tasks are built from."""
+
+    def __init__(self, embodiment: str):
+        with _silence():
+            self.p = BulletClient(connection_mode=pybullet.DIRECT)
+        look = LOOKS[embodiment]
+        self.p.setGravity(0, 0, -9.81)
+        self.p.setPhysicsEngineParameter(fixedTimeStep=DT, deterministicOverlappingPairs=1)
+        self.table = self.box((0.50, 0.30, 0.02), (0.66, 0, -0.02), look["table"])
+        self.p.changeDynamics(self.table, -1, lateralFriction=TABLE_FRICTION)
+        self.view = self.p.computeViewMatrixFromYawPitchRoll(
+            CAMERA_TARGET, CAMERA_DISTANCE, yaw=0, pitch=CAMERA_PITCH, roll=0, upAxisIndex=2
+        )
+        self.projection = self.p.computeProjectionMatrixFOV(CAMERA_FOV, 1.0, 0.3, 3.0)
+        self.light = look["light"]
+        # The wall is painted behind the picture: as a body it would take half the rendering time.
+        shade = np.linspace(1.06, 0.94, SIZE * SUPERSAMPLE)[:, None, None]  # lighter near the ceiling
+        self.wall = np.uint8(shade * look["wall"][:3] * 255)
+
+    def box(self, half, position, rgba, mass=0.0, solid=True) -> int:
+        """Add a box of half extents `half`; static where `mass` (kg) is 0, untouchable if not solid."""
+        return self._body(self.p.GEOM_BOX, {"halfExtents": half}, {}, position, rgba, mass, solid)
+
+    def cylinder(self, radius, height, position, rgba, mass=0.0, solid=True) -> int:
+        """Add an upright cylinder."""
+        return self._body(
+            self.p.GEOM_CYLINDER, {"radius": radius, "length": height}, {"radius": radius, "height": height},
+            position, rgba, mass, solid,
+        )  # fmt: skip
+
+    def sphere(self, radius, position, rgba, mass=0.0, solid=True) -> int:
+        """Add a ball."""
+        return self._body(self.p.GEOM_SPHERE, {"radius": radius}, {}, position, rgba, mass, solid)
+
+    def _body(self, kind, look, touch, position, rgba, mass, solid):
+        visual = self.p.createVisualShape(kind, rgbaColor=rgba, specularColor=(0, 0, 0), **look)
+        collision = self.p.createCollisionShape(kind, **(touch or look)) if solid else -1
+        body = self.p.createMultiBody(mass, collision, visual, position)
+        # Bullet's default damping of 0.04 would brake a sliding object besides friction.
+        self.p.changeDynamics(body, -1, linearDamping=0, angularDamping=0)
+        return body
+
+    def render(self) -> np.ndarray:
+        """The camera's picture, (84, 84, 3) uint8 RGB."""
+        size = SIZE * SUPERSAMPLE
+        _, _, rgba, depth, _ = self.p.getCameraImage(
+            size, size, self.view, self.projection, lightDirection=self.light, shadow=0,
+            lightAmbientCoeff=0.65, lightDiffuseCoeff=0.35, lightSpecularCoeff=0.0,
+            renderer=self.p.ER_TINY_RENDERER, flags=self.p.ER_NO_SEGMENTATION_MASK,
+        )  # fmt: skip
+        rgb = np.asarray(rgba, np.uint8).reshape(size, size, 4)[..., :3]
+        empty = np.asarray(depth).reshape(size, size, 1)  > 0.999
+        return cv2.resize(np.where(empty, self.wall, rgb), (SIZE, SIZE), interpolation=cv2.INTER_AREA)
+
+    def pixel(self, point) -> np.ndarray:
+        """Where a world point (m) appears in the image: (x right, y down) in pixels."""
+        view = np.array(self.view).reshape(4, 4).T
+        projection = np.array(self.projection).reshape(4, 4).T
+        clip = projection @ view @ np.append(point, 1.0)
+        return (clip[:2] / clip[3] * (1, -1) + 1) / 2 * SIZE
+
+
+class TaskEnv(gym.Env):
+    """A task of the paper as a Gymnasium environment.
+
+    Observation: (84, 84, 3) uint8 RGB; with `observation="state"` the simulator's truth instead,
+    (tip, object, target) in metres, for lessons and tests only: the method never uses it.
+    Action: (3,) in [-1, 1], a step of the tip's goal along x, y, z, at full action `STEP` metres.
+    `embodiment`: "robot" or "human". `jitter`: how far, in metres, the start pose may be off the fixed
+    configuration. reset(options={"scatter": True}) puts the object anywhere, for random data.
+    """
+
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 25}
+
+    # Every task states these; the values here are what most tasks use.
+    STEP = 0.02  # m, tip's goal per control step at full action: 0.5 m/s
+    LEASH = 0.05  # m, how far the goal may run ahead of the tip
+    WORKSPACE = ((0.42, -0.01, 0.015), (0.74, 0.01, 0.17))  # m, box of the tip's goal
+    START = (0.46, 0.0, 0.12)  # m, the tip at reset
+
+    def __init__(self, embodiment="robot", render_mode=None, observation="rgb", jitter=0.0):
+        if embodiment not in LOOKS:
+            raise ValueError(f"embodiment={embodiment!r}: choose 'robot' or 'human'.")
+        if observation not in ("rgb", "state"):
+            raise ValueError(f"observation={observation!r}: choose 'rgb' or 'state'.")
+        self.embodiment, self.render_mode = embodiment, render_mode
+        self.observation, self.jitter = observation, jitter
+        self.action_space = gym.spaces.Box(-1, 1, (3,), np.float32)
+        if observation == "rgb":
+            self.observation_space = gym.spaces.Box(0, 255, (SIZE, SIZE, 3), np.uint8)
+        else:
+            self.observation_space = gym.spaces.Box(-np.inf, np.inf, (9,), np.float32)
+        self.world = World(embodiment)
+        self.arm = Arm(self.world.p, embodiment)
+        self.build()
+        self._fresh = self.world.p.saveState()  # contact caches too, which a reset of poses keeps
+
+    # What a task file writes ------------------------------------------------------------------------
+
+    def build(self) -> None:
+        """Add the task's objects to `self.world`."""
+        raise NotImplementedError
+
+    def place(self, offset: np.ndarray, scatter: bool) -> None:
+        """Put the objects at their start, moved by `offset` (m), or anywhere if `scatter`."""
+        raise NotImplementedError
+
+    def object_position(self) -> np.ndarray:
+        """Centre of the thing the task is about, (3,) in m."""
+        raise NotImplementedError
+
+    def is_success(self) -> bool:
+        """Whether the task is done now."""
+        raise NotImplementedError
+
+    def waypoints(self) -> list[tuple[np.ndarray, float]]:
+        """The expert's way from the start: (tip position in m, seconds to get there)."""
+        raise NotImplementedError
+
+    # Gymnasium --------------------------------------------------------------------------------------
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self.world.p.restoreState(self._fresh)
+        scatter = bool((options or {}).get("scatter", False))
+        offset = np.array([*self.np_random.uniform(-self.jitter, self.jitter, 4)])
+        start = np.array(self.START) + (offset[0], 0, offset[1])
+        if scatter:
+            low, high = np.array(self.WORKSPACE)
+            start = self.np_random.uniform(low, high)
+        self.arm.reset(start)
+        self.place(np.array([offset[2], offset[3] / 2, 0]), scatter)
+        return self._observe(), self._info()
+
+    def step(self, action):
+        action = np.clip(np.asarray(action, float), -1, 1)
+        x = self.arm.tip_pose()[0]
+        goal = self.arm.goal + self.STEP * action
+        goal = np.clip(goal, x - self.LEASH, x + self.LEASH)  # the goal must not run away from a stuck tip
+        self.arm.goal = np.clip(goal, *self.WORKSPACE)
+        self.arm.prepare()
+        for _ in range(SUBSTEPS):
+            self.arm.actuate()
+            self.world.p.stepSimulation()
+        info = self._info()
+        return self._observe(), float(info["is_success"]), False, False, info
+
+    def render(self):
+        return self.world.render() if self.render_mode == "rgb_array" else None
+
+    def close(self):
+        if self.world is not None:
+            self.world.p.disconnect()
+            self.world = None
+
+    def _observe(self):
+        if self.observation == "rgb":
+            return self.world.render()
+        parts = self.arm.tip_pose()[0], self.object_position(), self.target_position()
+        return np.concatenate(parts).astype(np.float32)
+
+    def _info(self):
+        return {"is_success": bool(self.is_success())}
+
+    def true_pixels(self) -> np.ndarray:
+        """(4,): the tip's and the object's place in the image, in pixels; for plots and tests only."""
+        return np.concatenate([self.world.pixel(self.arm.tip_pose()[0]), self.world.pixel(self.object_position())])
+
+
+def expert_actions(env: TaskEnv, rng: np.random.Generator | None = None):
+    """Yield the actions that lead the tip along the task's waypoints; human-like with an `rng`.
+
+    Each leg follows a minimum-jerk profile (Flash and Hogan 1985). With `rng` the legs bend, take
+    uneven time, and sometimes end in a short pause.
+    """
+    start = env.arm.goal.copy()
+    for end, seconds in env.waypoints():
+        bend = np.zeros(3)
+        if rng is not None:
+            seconds *= rng.uniform(0.9, 1.15)
+            bend[[0, 2]] = rng.uniform(-1, 1, 2) * 0.08 * abs(end - start)[[2, 0]]
+        steps = max(1, round(seconds / (DT * SUBSTEPS)))
+        for i in range(1, steps + 1):
+            s = i / steps
+            s = s**3 * (10 - 15 * s + 6 * s * s)
+            wanted = start + s * (end - start) + np.sin(np.pi * s) * bend
+            yield np.clip((wanted - env.arm.goal) / env.STEP, -1, 1).astype(np.float32)
+        start = np.asarray(end, float)
+        if rng is not None and rng.random() < 0.4:
+            for _ in range(rng.integers(1, 4)):
+                yield np.zeros(3, np.float32)
+
+
+def random_actions(rng: np.random.Generator):
+    """Yield random actions for ever, each held for 4 to 12 steps, so that the arm gets about and
+    bumps into things; independent ones would tremble on the spot."""
+    while True:
+        action = rng.uniform(-1, 1, 3).astype(np.float32)
+        for _ in range(rng.integers(4, 13)):
+            yield action
+
+
+def record_random(env: TaskEnv, frames: int, seed: int, take: int = 25):
+    """Film `frames` frames of random motion in takes of `take` frames, the object put anew for each.
+
+    Returns the frames (T, 84, 84, 3) uint8 and the true pixels (T, 4) of tip and object.
+    """
+    rng = np.random.default_rng(seed)
+    film, truth = [], []
+    while len(film) < frames:
+        film.append(env.reset(seed=int(rng.integers(2**31)), options={"scatter": True})[0])
+        truth.append(env.true_pixels())
+        for _, action in zip(range(take - 1), random_actions(rng), strict=False):
+            film.append(env.step(action)[0])
+            truth.append(env.true_pixels())
+    return np.stack(film[:frames]), np.stack(truth[:frames])
+
+
+def record_expert(env: TaskEnv, seed: int):
+    """Film one human-like expert episode. Returns frames, true pixels, and whether it succeeded."""
+    film = [env.reset(seed=seed)[0]]
+    truth, done = [env.true_pixels()], False
+    for action in expert_actions(env, np.random.default_rng(seed)):
+        frame, _, _, _, info = env.step(action)
+        film.append(frame)
+        truth.append(env.true_pixels())
+        done = info["is_success"]
+    return np.stack(film), np.stack(truth), done
