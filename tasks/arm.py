@@ -8,7 +8,9 @@ The robot is the Franka Panda, the human a shoulder, elbow, wrist and hand built
 
 from __future__ import annotations
 
+import shutil
 import tempfile
+import weakref
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -177,13 +179,13 @@ class Arm:
 
     def __init__(self, client, embodiment: str):
         self.p, self.spec = client, ARMS[embodiment]()
-        self._files = tempfile.TemporaryDirectory(prefix="lbw_arm_")  # the viewer reads meshes later
+        files = Path(tempfile.mkdtemp(prefix="lbw_arm_"))  # kept while we live: the viewer reads meshes
+        weakref.finalize(self, shutil.rmtree, files, ignore_errors=True)
         for name, text in {"arm.urdf": self.spec.urdf, **self.spec.meshes}.items():
-            Path(self._files.name, name).write_text(text)
+            (files / name).write_text(text)
         # The human's inertias are stated; the Panda file's are placeholders, Bullet's are better.
         flags = client.URDF_USE_INERTIA_FROM_FILE if embodiment == "human" else 0
-        file = str(Path(self._files.name, "arm.urdf"))
-        self.body = client.loadURDF(file, self.spec.base, useFixedBase=True, flags=flags)
+        self.body = client.loadURDF(str(files / "arm.urdf"), self.spec.base, useFixedBase=True, flags=flags)
         infos = [client.getJointInfo(self.body, j) for j in range(client.getNumJoints(self.body))]
         self.joints = [i[0] for i in infos if i[2] == client.JOINT_REVOLUTE]  # the 7 that turn
         self.links = {i[12].decode(): i[0] for i in infos}

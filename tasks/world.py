@@ -153,6 +153,7 @@ class TaskEnv(gym.Env):
         self.world = World(embodiment)
         self.arm = Arm(self.world.p, embodiment)
         self.build()
+        self.world.p.stepSimulation()  # a world that never stepped behaves unlike one that did
         self._fresh = self.world.p.saveState()  # contact caches too, which a reset of poses keeps
 
     # What a task file writes ------------------------------------------------------------------------

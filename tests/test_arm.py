@@ -1,0 +1,75 @@
+"""The arms and their controller: claims about kinematics and about how the tip moves."""
+
+import numpy as np
+import pytest
+
+from tasks.reach import Reach
+
+EMBODIMENTS = ("robot", "human")
+
+
+@pytest.fixture(params=EMBODIMENTS)
+def env(request):
+    env = Reach(embodiment=request.param, observation="state")
+    env.reset(seed=0)
+    yield env
+    env.close()
+
+
+def test_jacobian_agrees_with_finite_differences(env):
+    arm, h = env.arm, 1e-3
+    q, _ = arm.state()
+    _, R = arm.tip_pose()
+    numeric = np.zeros((6, 7))
+    for i, step in enumerate(np.eye(7) * h):
+        arm._set(q + step)
+        x1, R1 = arm.tip_pose()
+        arm._set(q - step)
+        x2, R2 = arm.tip_pose()
+        W = (R1 - R2) @ R.T / (2 * h)  # the skew matrix of the angular velocity
+        numeric[:, i] = [*(x1 - x2) / (2 * h), W[2, 1], W[0, 2], W[1, 0]]
+    np.testing.assert_allclose(arm.jacobian(q), numeric, atol=2e-4)
+
+
+@pytest.mark.parametrize("step", [(0.03, 0, 0), (0, 0, -0.03), (0.04, 0, 0.03)])
+def test_tip_follows_the_critically_damped_curve(env, step):
+    arm = env.arm
+    start = arm.tip_pose()[0]
+    arm.goal = start + step
+    moved = []
+    for _ in range(25):
+        arm.prepare()
+        for _ in range(10):
+            arm.actuate()
+            env.world.p.stepSimulation()
+            moved.append(arm.tip_pose()[0] - start)
+    length = np.linalg.norm(step)
+    along = np.array(moved) @ step / length
+    t = np.arange(1, len(along) + 1) / 250
+    ideal = length * (1 - np.exp(-20 * t) * (1 + 20 * t))  # natural frequency sqrt(400) = 20 rad/s
+    assert np.abs(along - ideal).max() < 0.05 * length
+    aside = np.array(moved) - np.outer(along, step) / length
+    assert np.abs(aside).max() < 0.05 * length
+
+
+def test_hand_keeps_pointing_down_in_a_fast_sweep(env):
+    tilt = []
+    for i in range(48):
+        env.step(np.array([1, 0, -1]) * (1 if (i // 8) % 2 == 0 else -1))
+        tilt.append(np.abs(env.arm._error(env.arm.goal)[3:]).max())
+    assert max(tilt) < 0.01  # rad
+
+
+def test_posture_torque_does_not_move_the_tip(env):
+    """The nullspace projection: a posture torque must leave the tip's acceleration at zero."""
+    q, _ = env.arm.state()
+    J, M = env.arm.jacobian(q), env.arm.mass_matrix(q)
+    Lambda = np.linalg.inv(J @ np.linalg.solve(M, J.T))
+    tau = (M - J.T @ Lambda @ J) @ np.ones(7)  # N^T M (posture)
+    np.testing.assert_allclose(J @ np.linalg.solve(M, tau), 0, atol=1e-6)
+
+
+def test_reset_puts_the_tip_where_it_was_told(env):
+    for goal in ((0.45, 0, 0.05), (0.70, 0.01, 0.15)):
+        env.arm.reset(np.array(goal))
+        np.testing.assert_allclose(env.arm.tip_pose()[0], goal, atol=1e-5)
