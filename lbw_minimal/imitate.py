@@ -1,5 +1,137 @@
+"""Learning by Watching, the whole method: one human video in, a policy out.
+
+    translate (Eq. 1-5)  ->  detect keypoints (Eq. 6-7)  ->  reward (Eq. 8-10)  ->  soft actor-critic
+
+Every stage leaves its result as a file in the run's folder and is skipped where that file exists, so
+a run that was killed goes on where it was. Frames are all that any stage learns from.
+"""
+
+from __future__ import annotations
+
+import json
+from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from lbw_minimal import munit, sac, transporter
+from lbw_minimal.reward import KeypointReward
+from lbw_minimal.training import Checkpoint, InputError, write_atomic
+from lbw_minimal.wrappers import KeypointObservation, KeypointRewardWrapper
+
+
 @dataclass(frozen=True)
 class Recipe:
-    human_frames: int
-    robot_frames: int
+    """How much of everything a task takes; the defaults serve all tasks."""
+
+    human_frames: int  # frames the translation sees: the demonstration and random motion (Table I)
+    robot_frames: int  # frames of random robot motion (Table I)
+    munit_iterations: int = 1500
+    munit_width: int = 20  # channels of the first layer
+    transporter_iterations: int = 1500
+    K: int = 5  # keypoints
+    policy_steps: int = 12_000  # environment steps of SAC
+
+
+@dataclass
+class Perception:
+    """The trained translator T and keypoint detector Psi, with what they make of the demonstration."""
+
+    translator: munit.MUNIT
+    style: torch.Tensor  # (style_dim,) the robot style that every human frame is given
+    detector: transporter.Transporter
+    translated: np.ndarray | None = None  # v^E (N, 84, 84, 3) uint8
+    z_E: np.ndarray | None = None  # (N, K, 2)
+
+    def translate(self, frames: np.ndarray) -> np.ndarray:
+        """Human frames (T, 84, 84, 3) uint8 as the robot would look, same shape."""
+        return munit.translate(self.translator, frames, self.style)
+
+    def detect(self, frames: np.ndarray) -> np.ndarray:
+        """Keypoints (T, K, 2) of robot frames, real or translated."""
+        return transporter.detect(self.detector, frames)
+
+
+class Run:
+    """The folder of one run: results of its stages, checkpoints, logs, and metrics.json."""
+
+    def __init__(self, out: Path):
+        self.out = Path(out)
+        path = self.out / "metrics.json"
+        self.metrics = json.loads(path.read_text()) if path.exists() else {"stages": {}}
+
+    def save(self) -> None:
+        write_atomic(self.out / "metrics.json", json.dumps(self.metrics, indent=1) + "\n")
+
+    @contextmanager
+    def stage(self, name: str):
+        """Lend a checkpoint to a training; when that is through, note its time and drop the file."""
+        checkpoint = Checkpoint(self.out / f"{name}.checkpoint")
+        yield checkpoint
+        self.metrics["stages"][name] = round(checkpoint.spent, 1)
+        self.save()
+        checkpoint.path.unlink(missing_ok=True)
+
+    def log(self, name: str, rows: list[dict]) -> None:
+        write_atomic(self.out / f"{name}.json", json.dumps(rows) + "\n")
+
+
+def load_perception(folder: Path, task: str) -> Perception:
+    """Perception from `translation.safetensors` and `keypoints.safetensors`.
+
+    Raises InputError if a file is missing, damaged, or belongs to another task.
+    """
+    translator, style = munit.load(Path(folder) / "translation.safetensors", task)
+    detector = transporter.load(Path(folder) / "keypoints.safetensors", task)
+    return Perception(translator, style, detector)
+
+
+def learn_perception(demo, random, robot, recipe: Recipe, *, task, seed, run: Run, device="cpu") -> Perception:
+    """Train T and Psi from human frames (demonstration and random motion) and random robot frames."""
+    human = np.concatenate([demo, random])
+    path = run.out / "translation.safetensors"
+    if not path.exists():
+        with run.stage("translation") as checkpoint:
+            T, log = munit.train(
+                human, robot, iterations=recipe.munit_iterations, width=recipe.munit_width,
+                seed=seed, device=device, checkpoint=checkpoint,
+            )  # fmt: skip
+            run.log("translation_log", log)
+            munit.save(path, T, munit.robot_style(T, robot), task)
+    T, style = munit.load(path, task)
+
+    path = run.out / "keypoints.safetensors"
+    if not path.exists():
+        with run.stage("keypoints") as checkpoint:
+            v, v_random = (munit.translate(T, x, style) for x in (demo, random) if len(x))
+            Psi, log = transporter.train(
+                [v, v_random, robot], iterations=recipe.transporter_iterations, K=recipe.K,
+                seed=seed, device=device, checkpoint=checkpoint,
+            )  # fmt: skip
+            run.log("keypoints_log", log)
+            transporter.save(path, Psi, task)
+    return Perception(T, style, transporter.load(path, task))
+
+
+def imitate(env, demo, robot, perception: Perception, recipe: Recipe, *, seed, run: Run, form="mended"):
+    """Learn a policy for `env`, a Gymnasium environment of RGB frames, from one demonstration.
+
+    demo (N, 84, 84, 3) uint8: the human video. robot (M, 84, 84, 3) uint8: random robot motion.
+    form: "literal" for Eq. 8-10 as written, "mended" for what `reward.py` adds.
+    Returns the agent, the reward, and `env` wrapped so that its observations are the policy's.
+    """
+    perception.translated = perception.translate(demo)  # v_1^E .. v_N^E
+    perception.z_E = perception.detect(perception.translated)  # z_1^E .. z_N^E, (N, K, 2)
+    reward = KeypointReward(perception.z_E, perception.detect(robot), form=form)
+    env = KeypointRewardWrapper(KeypointObservation(env, perception.detect), reward)
+    path = run.out / "policy.safetensors"
+    if path.exists():
+        agent = sac.load(path)
+    else:
+        with run.stage("policy") as checkpoint:
+            agent, log = sac.train(env, steps=recipe.policy_steps, seed=seed, checkpoint=checkpoint)
+            run.log("policy_log", log)
+            sac.save(path, agent)
+    return agent, reward, env

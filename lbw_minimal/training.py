@@ -99,13 +99,18 @@ def load_state(path: Path | str) -> dict:
 class Checkpoint:
     """One training's state on disk, saved at most every `seconds`, so that a kill costs no more.
 
-    `path` None switches it off: the same loop then runs without a file.
+    `path` None switches it off: the same loop then runs without a file. `spent` is the time the
+    training took so far in seconds, kills and resumes included.
     """
 
     def __init__(self, path: Path | str | None, seconds: float = 20.0):
         self.path = Path(path) if path else None
         self.seconds = seconds
-        self._last = time.monotonic()
+        self._start = self._last = time.monotonic()
+
+    @property
+    def spent(self) -> float:
+        return time.monotonic() - self._start
 
     def load(self) -> dict | None:
         """The saved state with torch's random state restored, or None where there is none."""
@@ -113,13 +118,15 @@ class Checkpoint:
             return None
         saved = load_state(self.path)
         torch.set_rng_state(saved["torch_rng"])
+        self._start -= saved["spent"]
         return saved["state"]
 
     def save(self, make_state, force: bool = False) -> None:
         """Call `make_state()` and save it, if `seconds` have passed or `force` asks for it."""
         if self.path is None or not (force or time.monotonic() - self._last > self.seconds):
             return
-        save_state(self.path, {"state": make_state(), "torch_rng": torch.get_rng_state()})
+        rest = {"torch_rng": torch.get_rng_state(), "spent": self.spent}
+        save_state(self.path, {"state": make_state(), **rest})
         self._last = time.monotonic()
 
 

@@ -1,0 +1,30 @@
+# make push: one command from a fresh clone to a robot that learnt from a video.
+PYTHON ?= python3
+VENV ?= .venv
+BIN = $(VENV)/bin
+
+.PHONY: push reach test slow bench clean
+
+push reach: $(VENV)/ready
+	$(BIN)/python -m tasks $@
+
+test: $(VENV)/ready
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/python -m pytest -q -m "not slow"
+
+slow: $(VENV)/ready
+	$(BIN)/python -m pytest -q -m slow
+
+bench: $(VENV)/ready
+	$(BIN)/python -m tasks bench
+
+$(VENV)/ready: requirements.txt
+	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; sys.exit(0 if (3, 10) <= v <= (3, 11) else \
+	    "Python %d.%d: PyBullet has wheels for Python 3.10 and 3.11 only; use make PYTHON=python3.11" % v)'
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install -q -r requirements.txt
+	touch $@
+
+clean:
+	rm -rf $(VENV) runs .pytest_cache .ruff_cache

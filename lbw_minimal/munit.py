@@ -1,0 +1,375 @@
+"""MUNIT (Eq. 1-5): frames of the human domain x become frames of the robot domain y, learnt from no pair.
+
+The content code c says where things are, the style code s how a domain looks: G_Y(c_x, s_y) is human frame
+x as the robot's camera would see it. In: videos (T, 84, 84, 3) uint8 of both domains. Out: the networks, and
+the translated video. Not in the paper, because without them small objects vanish or wall and table swap
+their brightness: a cycle loss, L1 weighted by the distance from the median frame, and a least-squares GAN.
+"""
+
+from __future__ import annotations
+
+import copy
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import torch
+import torch.nn.functional as F
+from torch import nn
+
+from lbw_minimal.training import (
+    Checkpoint,
+    InputError,
+    load_state,
+    pick_device,
+    progress,
+    save_state,
+    seed_everything,
+)
+
+LAMBDA_IMAGE, LAMBDA_CONTENT, LAMBDA_STYLE = 10.0, 1.0, 1.0  # Eq. 5; MUNIT's own values
+LAMBDA_CYCLE = 10.0  # not in the paper: MUNIT's authors add it where pixels must stay aligned, as here
+MOTION = 4.0  # not in the paper: an L1 of weight 1 everywhere forgets what covers 1 % of the picture
+LEARNING_RATE = 2e-4  # of both Adams, down to 0 over the second half
+AVERAGE = 0.995  # decay a step of the averaged weights, which flicker less from frame to frame
+LOG_EVERY = 50  # steps
+
+
+def adain(h: torch.Tensor, mean: torch.Tensor | None = None, std: torch.Tensor | None = None) -> torch.Tensor:
+    """h (B, C, H, W) with each channel of each image brought to that mean and std (B, C), by default 0 and 1."""
+    B, C, H, W = h.shape
+    # Batch norm over B * C channels is this very formula in one pass: 3 times faster on a CPU than var_mean.
+    mean, std = (None if p is None else p.float().reshape(-1) for p in (mean, std))
+    return F.batch_norm(h.reshape(1, B * C, H, W), None, None, std, mean, training=True).reshape(h.shape)
+
+
+class _Residual(nn.Module):
+    def __init__(self, c):
+        super().__init__()
+        self.first, self.second = nn.Conv2d(c, c, 3, padding=1), nn.Conv2d(c, c, 3, padding=1)
+
+    def forward(self, h, mean_1=None, std_1=None, mean_2=None, std_2=None):
+        return h + adain(self.second(F.relu(adain(self.first(h), mean_1, std_1))), mean_2, std_2)
+
+
+class _ContentEncoder(nn.Module):
+    def __init__(self, width, blocks):
+        super().__init__()
+        # Half of the published network's time goes into its layers at 84 x 84. Folding 2 x 2 pixels into
+        # channels starts at 42 x 42 and loses nothing.
+        self.stem = nn.Conv2d(12, 2 * width, 3, padding=1)
+        self.down = nn.Conv2d(2 * width, 4 * width, 4, 2, 1)
+        self.blocks = nn.Sequential(*(_Residual(4 * width) for _ in range(blocks)))
+
+    def forward(self, x):
+        h = F.relu(self.stem(F.pixel_unshuffle(x, 2)))  # (B, 2 width, 42, 42)
+        return self.blocks(F.relu(adain(self.down(h))))  # (B, 4 width, 21, 21)
+
+
+def _style_encoder(style_dim):
+    # No normalisation: it would remove the very means and contrasts that are the style.
+    return nn.Sequential(
+        *(nn.Conv2d(3, 16, 6, 2, 2), nn.ReLU(inplace=True)),
+        *(nn.Conv2d(16, 32, 4, 2, 1), nn.ReLU(inplace=True)),
+        *(nn.Conv2d(32, 64, 4, 2, 1), nn.ReLU(inplace=True)),
+        *(nn.AdaptiveAvgPool2d(1), nn.Flatten(), nn.Linear(64, style_dim)),
+    )
+
+
+class _Decoder(nn.Module):
+    def __init__(self, width, style_dim, blocks):
+        super().__init__()
+        self.blocks = nn.ModuleList(_Residual(4 * width) for _ in range(blocks))
+        self.mlp = nn.Sequential(nn.Linear(style_dim, 64), nn.ReLU(), nn.Linear(64, blocks * 4 * 4 * width))
+        self.up = nn.ConvTranspose2d(4 * width, 2 * width, 4, 2, 1)
+        self.out = nn.ConvTranspose2d(2 * width, 3, 4, 2, 1)
+        with torch.no_grad():  # start at middle grey: at the ends of tanh a wrong brightness would stick
+            self.out.weight.mul_(0.1)
+            self.out.bias.zero_()
+
+    def forward(self, c, s):
+        p = self.mlp(s).view(len(s), len(self.blocks), 4, -1)  # (B, blocks, 4, 4 width)
+        for i, block in enumerate(self.blocks):
+            c = block(c, p[:, i, 0], 1 + p[:, i, 1], p[:, i, 2], 1 + p[:, i, 3])
+        return torch.tanh(self.out(F.relu(self.up(c))))  # (B, 3, 84, 84)
+
+
+class MUNIT(nn.Module):
+    """E^c, E^s and G of both domains, "x" (human) and "y" (robot); images (B, 3, 84, 84) in [-1, 1]."""
+
+    def __init__(self, width: int = 20, style_dim: int = 8, blocks: int = 2, shared_content: bool = True):
+        super().__init__()
+        self.sizes = dict(width=width, style_dim=style_dim, blocks=blocks, shared_content=shared_content)
+        E_c = _ContentEncoder(width, blocks)
+        # Shared, equal things of both domains start with equal codes; apart, the critics alone must match them.
+        self.E_c = nn.ModuleDict({"x": E_c, "y": E_c if shared_content else _ContentEncoder(width, blocks)})
+        self.E_s = nn.ModuleDict({domain: _style_encoder(style_dim) for domain in "xy"})
+        self.G = nn.ModuleDict({domain: _Decoder(width, style_dim, blocks) for domain in "xy"})
+
+    def content(self, image: torch.Tensor, domain: str) -> torch.Tensor:
+        """c (B, 4 width, 21, 21) of images of that domain."""
+        return self.E_c[domain](image)
+
+    def style(self, image: torch.Tensor, domain: str) -> torch.Tensor:
+        """s (B, style_dim) of images of that domain."""
+        return self.E_s[domain](image)
+
+    def decode(self, c: torch.Tensor, s: torch.Tensor, domain: str) -> torch.Tensor:
+        """Images (B, 3, 84, 84) of that domain with content c and style s (B, style_dim)."""
+        return self.G[domain](c, s)
+
+
+class Critic(nn.Module):
+    """D of one domain: scores of all patches of 22 and 44 pixels of (B, 3, 84, 84), 1 real and 0 translated."""
+
+    def __init__(self, width: int = 32):
+        super().__init__()
+        self.scales = nn.ModuleList(
+            nn.Sequential(
+                *(nn.Conv2d(3, width, 4, 2, 1), nn.LeakyReLU(0.2, inplace=True)),
+                *(nn.Conv2d(width, 2 * width, 4, 2, 1), nn.LeakyReLU(0.2, inplace=True)),
+                *(nn.Conv2d(2 * width, 4 * width, 4, 2, 1), nn.LeakyReLU(0.2, inplace=True)),
+                nn.Conv2d(4 * width, 1, 1),
+            )
+            for _ in range(2)  # at 84 pixels a third scale would see single cells
+        )
+
+    def forward(self, image):
+        return [self.scales[0](image), self.scales[1](F.avg_pool2d(image, 2))]  # (B, 1, 10, 10), (B, 1, 5, 5)
+
+
+class Swap(NamedTuple):
+    """The codes of a batch of both domains and their crosswise translations."""
+
+    c_x: torch.Tensor
+    c_y: torch.Tensor
+    s_x: torch.Tensor
+    s_y: torch.Tensor
+    x_of_y: torch.Tensor  # G_X(c_y, s_x)
+    y_of_x: torch.Tensor  # G_Y(c_x, s_y)
+
+
+def swap(model: MUNIT, x: torch.Tensor, y: torch.Tensor) -> Swap:
+    """Encode x and y, both (B, 3, 84, 84), and decode each content with the other's style."""
+    c_x, c_y = model.content(x, "x"), model.content(y, "y")
+    s_x, s_y = model.style(x, "x"), model.style(y, "y")
+    return Swap(c_x, c_y, s_x, s_y, model.decode(c_y, s_x, "x"), model.decode(c_x, s_y, "y"))
+
+
+def _l1(a, b, weight=1.0):
+    return (weight * (a.float() - b.float()).abs()).mean()
+
+
+def _least_squares(scores, target):
+    # Not in the paper: the logarithms of Eq. 1 give a generator that is losing no gradient; this does.
+    return sum(((score.float() - target) ** 2).mean() for score in scores) / len(scores)
+
+
+def generator_losses(model, critics, x, y, swapped, weight_x=1.0, weight_y=1.0) -> dict[str, torch.Tensor]:
+    """The generators' and encoders' side of Eq. 1 to 4 by the paper's names, and the cycle loss L_cyc.
+
+    x, y (B, 3, 84, 84) in [-1, 1]; weight_x, weight_y (B, 1, 84, 84) weigh the L1 of Eq. 2 and of the cycle.
+    """
+    c_x, c_y, s_x, s_y, x_of_y, y_of_x = swapped
+    c_x_again, c_y_again = model.content(y_of_x, "y"), model.content(x_of_y, "x")
+    return {
+        "L_GAN^x": _least_squares(critics["x"](x_of_y), 1.0),  # Eq. 1
+        "L_GAN^y": _least_squares(critics["y"](y_of_x), 1.0),
+        "L_rec^x": _l1(model.decode(c_x, s_x, "x"), x, weight_x),  # Eq. 2
+        "L_rec^y": _l1(model.decode(c_y, s_y, "y"), y, weight_y),
+        "L_rec^c_x": _l1(c_x_again, c_x),  # Eq. 3
+        "L_rec^c_y": _l1(c_y_again, c_y),
+        "L_rec^s_x": _l1(model.style(x_of_y, "x"), s_x),  # Eq. 4
+        "L_rec^s_y": _l1(model.style(y_of_x, "y"), s_y),
+        "L_cyc^x": _l1(model.decode(c_x_again, s_x, "x"), x, weight_x),  # not in the paper
+        "L_cyc^y": _l1(model.decode(c_y_again, s_y, "y"), y, weight_y),
+    }
+
+
+def total_loss(L: dict[str, torch.Tensor]) -> torch.Tensor:
+    """L_MUNIT of Eq. 5 plus the cycle loss."""
+    return (
+        L["L_GAN^x"]
+        + L["L_GAN^y"]
+        + LAMBDA_IMAGE * (L["L_rec^x"] + L["L_rec^y"])
+        + LAMBDA_CONTENT * (L["L_rec^c_x"] + L["L_rec^c_y"])
+        + LAMBDA_STYLE * (L["L_rec^s_x"] + L["L_rec^s_y"])  # Eq. 5
+        + LAMBDA_CYCLE * (L["L_cyc^x"] + L["L_cyc^y"])  # not in the paper
+    )
+
+
+def discriminator_losses(critics, x, y, x_of_y, y_of_x) -> dict[str, torch.Tensor]:
+    """The critics' side of Eq. 1, in least squares: real frames x, y to 1, translations to 0."""
+    x_of_y, y_of_x = x_of_y.detach(), y_of_x.detach()
+    return {
+        "L_D^x": _least_squares(critics["x"](x), 1.0) + _least_squares(critics["x"](x_of_y), 0.0),  # Eq. 1
+        "L_D^y": _least_squares(critics["y"](y), 1.0) + _least_squares(critics["y"](y_of_x), 0.0),
+    }
+
+
+def to_images(frames: np.ndarray, device: torch.device | str = "cpu") -> torch.Tensor:
+    """Frames (B, H, W, 3) uint8 as images (B, 3, H, W) in [-1, 1]."""
+    # Permuted, not copied: this is torch's channels_last, in which the convolutions take 2/3 of the time.
+    return torch.from_numpy(frames).to(device).permute(0, 3, 1, 2).float() / 127.5 - 1
+
+
+def to_frames(images: torch.Tensor) -> np.ndarray:
+    """Images (B, 3, H, W) in [-1, 1] as frames (B, H, W, 3) uint8."""
+    return ((images.float() + 1) * 127.5).round().clamp(0, 255).byte().permute(0, 2, 3, 1).cpu().numpy()
+
+
+def _bfloat16(device):
+    # bfloat16 halves a convolution's time where the processor knows it, and costs time where it does not.
+    able = device.type != "cpu" or torch.cpu.get_capabilities().get("avx512_bf16", False)
+    return torch.autocast(device.type, torch.bfloat16, enabled=able)
+
+
+class _Domain:
+    """Frames of one domain with their median, drawn in batches with their L1 weights."""
+
+    def __init__(self, frames, device):
+        self.frames, self.device = frames, device
+        self.median = to_images(np.median(frames, axis=0).astype(np.uint8)[None], device)
+
+    def batch(self, rng, size):
+        images = to_images(self.frames[rng.integers(len(self.frames), size=size)], self.device)
+        return images, 1 + MOTION * (images - self.median).abs().mean(
+            1, keepdim=True
+        )  # weight (B, 1, 84, 84)
+
+
+def train(
+    human: np.ndarray,
+    robot: np.ndarray,
+    *,
+    iterations: int,
+    seed: int,
+    width: int = 20,
+    batch: int = 4,
+    device: str = "cpu",
+    checkpoint: Checkpoint = Checkpoint(None),
+) -> tuple[MUNIT, list[dict]]:
+    """Train on human and robot frames (T, 84, 84, 3) uint8; returns the model of averaged weights and a log.
+
+    A row of the log holds `step`, each loss's mean since the row before, and how many grey levels (0-255) the
+    mean translation is off that domain's mean frame: `mean_image^x`, `mean_image^y`. Different poses cost a few;
+    over 20 two regions, such as wall and table, have swapped their brightness.
+    """
+    rng = seed_everything(seed)
+    device = pick_device(device)
+    model = MUNIT(width).to(device, memory_format=torch.channels_last)
+    critics = nn.ModuleDict({d: Critic() for d in "xy"}).to(device, memory_format=torch.channels_last)
+    average = copy.deepcopy(model)
+    adam_G, adam_D = (torch.optim.Adam(m.parameters(), betas=(0.5, 0.999)) for m in (model, critics))
+    X, Y = _Domain(human, device), _Domain(robot, device)
+    stateful = dict(model=model, critics=critics, average=average, adam_G=adam_G, adam_D=adam_D)
+
+    step, log, sums = 0, [], {}
+    if saved := checkpoint.load():
+        for name, thing in stateful.items():
+            thing.load_state_dict(saved[name])
+        rng.bit_generator.state = saved["rng"]
+        step, log, sums = saved["step"], saved["log"], saved["sums"]
+
+    def state():
+        now = {name: thing.state_dict() for name, thing in stateful.items()}
+        return now | dict(rng=rng.bit_generator.state, step=step, log=log, sums=sums)
+
+    bar = progress(iterations, "MUNIT", step)
+    while step < iterations:
+        for group in adam_G.param_groups + adam_D.param_groups:
+            group["lr"] = LEARNING_RATE * min(1.0, 2 * (1 - step / iterations))
+        x, weight_x = X.batch(rng, batch)
+        y, weight_y = Y.batch(rng, batch)
+
+        critics.requires_grad_(False)  # the generators' step learns through the critics, not in them
+        with _bfloat16(device):
+            swapped = swap(model, x, y)
+            L_G = generator_losses(model, critics, x, y, swapped, weight_x, weight_y)
+        adam_G.zero_grad()
+        total_loss(L_G).backward()
+        adam_G.step()
+
+        critics.requires_grad_(True)
+        with _bfloat16(device):  # on the translations made above: making new ones costs a fifth more
+            L_D = discriminator_losses(critics, x, y, swapped.x_of_y, swapped.y_of_x)
+        adam_D.zero_grad()
+        sum(L_D.values()).backward()
+        adam_D.step()
+
+        step += 1
+        decay = min(AVERAGE, step / (step + 10))  # short at first, or the random start stays in for long
+        with torch.no_grad():
+            for mean, p in zip(average.parameters(), model.parameters(), strict=True):
+                mean.lerp_(p, 1 - decay)
+        for name, loss in (L_G | L_D).items():
+            sums[name] = sums.get(name, 0.0) + loss.item()
+        if step % LOG_EVERY == 0:
+            log.append({"step": step} | {name: value / LOG_EVERY for name, value in sums.items()})
+            log[-1] |= _mean_image_errors(mean_images(average, human, robot))
+            sums = {}
+            bar.set_postfix_str(f"cycle {log[-1]['L_cyc^y']:.3f}")
+        bar.update()
+        checkpoint.save(state)
+    bar.close()
+    checkpoint.save(state, force=True)
+    return average.eval(), log
+
+
+def _spread(frames, n):
+    return frames[np.linspace(0, len(frames) - 1, min(n, len(frames))).astype(int)]
+
+
+@torch.no_grad()
+def robot_style(model: MUNIT, robot_frames: np.ndarray) -> torch.Tensor:
+    """Mean style code (style_dim,) of up to 64 of the real robot frames (T, 84, 84, 3) uint8."""
+    device = next(model.parameters()).device
+    return model.style(to_images(_spread(robot_frames, 64), device), "y").mean(0)
+
+
+def translate(model: MUNIT, frames: np.ndarray, robot_style: torch.Tensor) -> np.ndarray:
+    """Human frames (T, 84, 84, 3) uint8 as the robot's, same shape and type: G_Y(c_x, s_y).
+
+    One style (style_dim,) for the whole video: a fresh one a frame would flicker into the keypoints.
+    """
+    return _decoded(model, frames, robot_style, "x", "y")
+
+
+@torch.no_grad()
+def _decoded(model, frames, style, source, target):
+    device, made = style.device, []
+    for start in range(0, len(frames), 32):
+        c = model.content(to_images(frames[start : start + 32], device), source)
+        made.append(to_frames(model.decode(c, style.expand(len(c), -1), target)))
+    return np.concatenate(made)
+
+
+@torch.no_grad()
+def mean_images(model: MUNIT, human: np.ndarray, robot: np.ndarray) -> dict[str, np.ndarray]:
+    """Mean frames (84, 84, 3) in 0-255: "x" and "y" of the domains, "x_of_y" and "y_of_x" of translations."""
+    human, robot = _spread(human, 32), _spread(robot, 32)
+    s_x = model.style(to_images(human, next(model.parameters()).device), "x").mean(0)
+    x_of_y, y_of_x = _decoded(model, robot, s_x, "y", "x"), translate(model, human, robot_style(model, robot))
+    return {k: f.mean(0) for k, f in (("x", human), ("x_of_y", x_of_y), ("y", robot), ("y_of_x", y_of_x))}
+
+
+def _mean_image_errors(mean):
+    return {
+        "mean_image^x": float(np.abs(mean["x_of_y"] - mean["x"]).mean()),
+        "mean_image^y": float(np.abs(mean["y_of_x"] - mean["y"]).mean()),
+    }
+
+
+def save(path: Path | str, model: MUNIT, task: str) -> None:
+    """Write the model with its sizes and the name of the task it was trained on."""
+    save_state(path, {"kind": "munit", "task": task, "sizes": model.sizes, "model": model.state_dict()})
+
+
+def load(path: Path | str) -> tuple[MUNIT, str]:
+    """The model that `save` wrote and its task. Raises InputError if the file holds something else."""
+    state = load_state(path)
+    if state.get("kind") != "munit":
+        raise InputError(f"{path}: not the weights of a MUNIT; give the file that its training wrote.")
+    model = MUNIT(**state["sizes"])
+    model.load_state_dict(state["model"])
+    return model.to(memory_format=torch.channels_last).eval(), state["task"]

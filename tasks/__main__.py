@@ -1,0 +1,214 @@
+"""The command line: `python -m tasks push` runs the paper on one task.
+
+    python -m tasks TASK      learn TASK from its human video, evaluate, write runs/TASK/report.html
+    python -m tasks record T  film the human videos of task T again
+    python -m tasks bench     steps, iterations and updates a second on this machine
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import hashlib
+import json
+import os
+import platform
+import resource
+import shutil
+import sys
+import time
+from importlib import import_module
+from pathlib import Path
+
+import gymnasium as gym
+import numpy as np
+import torch
+
+import tasks
+from lbw_minimal import video
+from lbw_minimal.imitate import Run, imitate, learn_perception, load_perception
+from lbw_minimal.report import wilson, write_report
+from lbw_minimal.training import InputError, pick_device, seed_everything
+from tasks.probe import probe
+from tasks.viewer import Recorder
+from tasks.world import record_expert, record_random
+
+ROOT = Path(__file__).resolve().parent.parent
+VIDEOS = ROOT / "tasks" / "videos"
+WEIGHTS = ROOT / "solutions" / "weights"
+FPS = 25
+EXPERTS = 15  # videos of the task being done; the method learns from the first alone
+TEST_EPISODES = 10  # as in the paper
+JITTER = 0.005  # m, start jitter, so that ten test episodes are ten episodes
+TEST_SEED = 1_000_000  # first seed of the test episodes, far from those of training
+PROBE_SEED = 2_000_000
+FAST = dict(munit_iterations=20, munit_width=8, transporter_iterations=30, policy_steps=1500, robot_frames=200)
+
+
+def parse(argv):
+    parser = argparse.ArgumentParser(prog="python -m tasks", description=__doc__.splitlines()[0])
+    parser.add_argument("what", help=f"a task ({', '.join(tasks.TASKS)}), or record, or bench")
+    parser.add_argument("task", nargs="?", help="with record: the task to film")
+    parser.add_argument("--video", type=Path, help="another human video, as the whole human domain")
+    parser.add_argument("--out", type=Path, help="folder of the run (runs/TASK)")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--device", default="cpu", help="cpu or cuda")
+    parser.add_argument("--threads", type=int, default=0, help="torch threads (all cores)")
+    parser.add_argument("--reward", choices=("mended", "literal"), default="mended")
+    parser.add_argument("--from-scratch", action="store_true", help="train perception too")
+    parser.add_argument("--weights", type=Path, help="folder with perception weights (the shipped ones)")
+    parser.add_argument("--evaluate", action="store_true", help="only replay the shipped policy")
+    parser.add_argument("--resume", action="store_true", help="go on with the run in --out")
+    parser.add_argument("--fast", action="store_true", help="a smoke run through every stage")
+    return parser.parse_args(argv)
+
+
+def task_module(name):
+    if name not in tasks.TASKS:
+        raise InputError(f"{name}: there is no such task; choose one of {', '.join(tasks.TASKS)}.")
+    return import_module(f"tasks.{name}")
+
+
+def task_id(name):
+    return f"LbW-{name.capitalize()}-v0"
+
+
+def record(name):
+    """Film 15 expert videos and one of random motion; demonstration and random have Table I's frames."""
+    recipe = task_module(name).RECIPE
+    folder = VIDEOS / name
+    folder.mkdir(parents=True, exist_ok=True)
+    env = gym.make(task_id(name), embodiment="human").unwrapped
+    seed, films = 0, []
+    while len(films) < EXPERTS:
+        film, _, done = record_expert(env, seed)
+        seed += 1
+        if done:  # a human films again when it went wrong
+            films.append(film)
+            video.write(folder / f"expert_{len(films):02d}.mp4", film, FPS)
+    random, _ = record_random(env, recipe.human_frames - len(films[0]), seed=seed, take=20)
+    video.write(folder / "random.mp4", random, FPS)
+    print(f"{name}: {EXPERTS} expert videos and {len(random)} frames of random motion in {folder}")
+
+
+def run(args):
+    """One task from its human video to its report. Returns the success rate."""
+    name, module = args.what, task_module(args.what)
+    recipe = dataclasses.replace(module.RECIPE, **FAST) if args.fast else module.RECIPE
+    device = pick_device(args.device)
+    torch.set_num_threads(args.threads or os.cpu_count())
+    from_scratch = args.from_scratch or args.fast or args.video is not None
+
+    # Look at everything the user gave before anything is written.
+    clip = args.video or VIDEOS / name / "expert_01.mp4"
+    demo, warnings = video.read(clip)
+    for warning in warnings:
+        print(f"warning: {warning}", file=sys.stderr)
+    random = demo[:0] if args.video else video.read(VIDEOS / name / "random.mp4")[0]
+    perception = None if from_scratch else load_perception(args.weights or WEIGHTS / name, name)
+    settings = {
+        "task": name, "seed": args.seed, "reward": args.reward, "fast": args.fast,
+        "from_scratch": from_scratch, "video": hashlib.sha256(demo.tobytes()).hexdigest()[:16],
+    }  # fmt: skip
+    out = prepare_folder(args.out or Path("runs") / name, settings, args.resume)
+    here = Run(out)
+    here.metrics["settings"] = settings | {"recipe": dataclasses.asdict(recipe)}
+    here.metrics["machine"] = f"{platform.machine()}, {os.cpu_count()} cores, torch {torch.__version__}"
+
+    start = time.monotonic()
+    films = gym.make(task_id(name)).unwrapped
+    frames = recipe.robot_frames if from_scratch else min(400, recipe.robot_frames)
+    robot, _ = record_random(films, frames, seed=args.seed)
+    here.metrics["stages"]["robot_video"] = round(time.monotonic() - start, 1)
+
+    if from_scratch:
+        seed_everything(args.seed)
+        perception = learn_perception(
+            demo, random, robot, recipe, task=name, seed=args.seed, run=here, device=device
+        )
+        if "perception" not in here.metrics:
+            here.metrics["perception"] = probe(task_id(name), perception, PROBE_SEED + args.seed)
+            here.save()
+    env = gym.make(task_id(name), jitter=JITTER)
+    agent, reward, env = imitate(
+        env, demo, robot, perception, recipe, seed=args.seed, run=here, form=args.reward
+    )
+
+    episodes, first, scene = evaluate(agent, env, 2 if args.fast else TEST_EPISODES)
+    here.metrics["episodes"] = episodes
+    wins, n = sum(e["success"] for e in episodes), len(episodes)
+    low, high = wilson(wins, n)
+    here.metrics["success"] = {"rate": wins / n, "low": low, "high": high, "episodes": n}
+    here.metrics["memory_mb"] = round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+    here.save()
+    write_report(out / "report.html", task=name, demo=demo, translated=perception.translated,
+                 z_demo=perception.z_E, log=json.loads((out / "policy_log.json").read_text()),
+                 episode=first, metrics=here.metrics, scene_html=scene)  # fmt: skip
+    print(f"{name}: {wins}/{n} successes (95% CI {low:.2f}-{high:.2f})")
+    print(f"report: {out / 'report.html'}")
+
+
+def prepare_folder(out, settings, resume):
+    """The run's folder: the same run's if `resume`, else a new one. Raises InputError where it cannot be."""
+    note = out / "settings.json"
+    if resume:
+        if not note.exists():
+            raise InputError(f"{out}: there is no run to resume here; start it without --resume.")
+        if json.loads(note.read_text()) != settings:
+            raise InputError(f"{out}: its run had other settings ({note.name}); give those, or another --out.")
+        return out
+    if note.exists():  # an older run of ours, and nobody else's folder, makes room
+        shutil.rmtree(out)
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        note.write_text(json.dumps(settings))
+    except OSError as error:
+        raise InputError(f"{out}: cannot write there ({error.strerror}); give another --out.") from None
+    return out
+
+
+def evaluate(agent, env, n):
+    """Test episodes of the deterministic policy: a row each, the first filmed and mirrored in 3-D.
+
+    Success is the paper's: the task is complete at some step within the horizon.
+    """
+    rows, first, scene = [], {}, None
+    for i in range(n):
+        z, _ = env.reset(seed=TEST_SEED + i)
+        base = env.unwrapped
+        recorder = Recorder(base.world.p._client) if i == 0 else None
+        film, zs, parts, done, hits = [], [z], [], False, []
+        while not done:
+            z, _, terminated, truncated, info = env.step(agent.act(z, deterministic=True))
+            done = terminated or truncated
+            hits.append(info["is_success"])
+            if recorder:
+                film.append(base.world.render())
+                zs.append(z)
+                parts.append(info["reward_parts"])
+                recorder.snap()
+        rows.append({"seed": TEST_SEED + i, "success": any(hits), "success_at_end": hits[-1],
+                     "first_success": hits.index(True) + 1 if any(hits) else None})  # fmt: skip
+        if recorder:
+            first = {"frames": np.stack(film), "z": np.stack(zs[1:]), "parts": parts}
+            scene = recorder.html(title="A test episode")
+    return rows, first, scene
+
+
+def main(argv=None):
+    args = parse(argv)
+    try:
+        if args.what == "record":
+            record(args.task)
+        elif args.what == "bench":
+            import_module("tasks.bench").main()
+        else:
+            run(args)
+    except InputError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

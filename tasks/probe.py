@@ -1,0 +1,59 @@
+"""How good is perception? The simulator knows the truth, so it can be measured, not admired.
+
+In: a trained translator and detector. Out: for the tip and the object, R^2 of a linear map from the
+keypoints z to their true pixels, on robot frames and on translated human frames that no training saw.
+The truth goes into these figures and nowhere else.
+"""
+
+from __future__ import annotations
+
+import gymnasium as gym
+import numpy as np
+
+from lbw_minimal.transporter import r2
+from tasks.world import record_expert, record_random
+
+NAMES = ("tip_x", "tip_y", "object_x", "object_y")
+
+
+def probe(task_id: str, perception, seed: int, frames: int = 400) -> dict:
+    """Figures of one task's perception, by frames filmed with seeds that no training uses.
+
+    Returns R^2 per coordinate on robot and translated frames, each with the residual in pixels, the
+    standard deviation of every keypoint, and in the translated demonstration the distance from tip to
+    object while that moves, minus the robot's own when it pushes, in pixels.
+    """
+    robot = gym.make(task_id, embodiment="robot").unwrapped
+    human = gym.make(task_id, embodiment="human").unwrapped
+    film, truth = record_random(robot, 2 * frames, seed)
+    z = perception.detect(film)
+    v, v_truth = record_random(human, frames, seed + 1)
+    z_v = perception.detect(perception.translate(v))
+    half = frames // 2
+    sets = {
+        "robot": (z[:frames], truth[:frames], z[frames:], truth[frames:]),
+        "translated": (z_v[:half], v_truth[:half], z_v[half:], v_truth[half:]),
+        # The robot's map applied to translated frames: do both put the same thing in the same place?
+        "transfer": (z[:frames], truth[:frames], z_v, v_truth),
+    }
+    out = {}
+    for name, (z_fit, px_fit, z_held, px_held) in sets.items():
+        moves = px_held.std(0) > 0.5  # R^2 says nothing of what does not move
+        error = px_held - linear(z_fit, px_fit)(z_held)
+        score = r2(z_fit, px_fit, z_held, px_held)
+        out[name] = {
+            n: {"r2": round(float(s), 3) if m else None, "px": round(float(e), 2)}
+            for n, s, m, e in zip(NAMES, score, moves, np.sqrt((error**2).mean(0)), strict=True)
+        }
+    out["keypoint_std"] = np.round(z.reshape(len(z), -1).std(0), 3).tolist()
+    return out
+
+
+def linear(z, pixels):
+    """The least-squares map from keypoints (T, K, 2) to pixels (T, n), as a function."""
+
+    def flat(z):
+        return np.concatenate([z.reshape(len(z), -1), np.ones((len(z), 1))], 1)
+
+    W = np.linalg.lstsq(flat(z), pixels, rcond=None)[0]
+    return lambda z: flat(z) @ W
