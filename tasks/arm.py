@@ -22,7 +22,7 @@ KD = 2 * np.sqrt(KP)  # 1/s, critical damping
 FRICTION = 0.4  # of gripper and hand: rougher ones stick to a pushed object and tip it over
 KP_POSTURE = 10.0  # 1/s^2, pull towards the rest posture, in the nullspace of the tip's motion
 
-WHITE, DARK = (0.93, 0.93, 0.91, 1), (0.24, 0.25, 0.28, 1)
+WHITE = (0.90, 0.90, 0.88, 1)
 SKIN, SLEEVE = (0.86, 0.63, 0.50, 1), (0.22, 0.30, 0.44, 1)
 
 
@@ -53,7 +53,6 @@ def panda() -> ArmSpec:
                             f'<origin rpy="0 0 0" xyz="0 {side * 0.015} 0.0584"/>', 1)  # fmt: skip
     # pybullet_data puts the grasp target 7 mm above the fingers' end; ours is where they touch.
     urdf = urdf.replace('xyz="0 0 0.105"', 'xyz="0 0 0.112"')
-    dark = ("panda_link6", "panda_leftfinger", "panda_rightfinger")
     return ArmSpec(
         urdf=urdf,
         base=(0.0, 0.0, 0.0),
@@ -61,9 +60,9 @@ def panda() -> ArmSpec:
         down=((1, 0, 0), (0, -1, 0), (0, 0, -1)),
         effort=(87, 87, 87, 87, 12, 12, 12),
         reach_links=("panda_hand", "panda_leftfinger", "panda_rightfinger"),
-        colours={f"panda_link{i}": WHITE for i in range(8)}
-        | {"panda_hand": WHITE}
-        | {name: DARK for name in dark},
+        # One colour: patches of an arm in two tones tempt the translation to paint them anywhere.
+        colours={name: WHITE for name in (*(f"panda_link{i}" for i in range(8)), "panda_hand",
+                                          "panda_leftfinger", "panda_rightfinger")},  # fmt: skip
     )
 
 
@@ -119,13 +118,14 @@ def human() -> ArmSpec:
     sleeve = [shape("mesh", ("sleeve.obj",), (0, 0, 0))]
     cuff = [shape("mesh", ("cuff.obj",), (0, 0, 0))]
     forearm = [shape("mesh", ("forearm.obj",), (0, 0, 0))]
-    # The hand points down like a gripper: its x axis along the fingers, y across, z forward.
-    palm = [shape("box", (0.10, 0.085, 0.034), (0.055, 0, 0))]
+    # The hand points down like a gripper: its x axis along the fingers, y across, z forward. Knuckles
+    # bent, fingertips together under the wrist, as one holds a pen.
+    palm = [shape("box", (0.085, 0.085, 0.045), (0.045, 0, 0)), shape("box", (0.05, 0.08, 0.058), (0.095, 0, 0))]
     fingers = [
-        shape("box", (length, 0.019, 0.021), (0.105 + length / 2, y, 0))
-        for y, length in ((-0.033, 0.072), (-0.011, 0.085), (0.011, 0.082), (0.033, 0.065))
+        shape("box", (length, 0.019, 0.023), (0.115 + length / 2, y, 0))
+        for y, length in ((-0.033, 0.062), (-0.011, 0.075), (0.011, 0.072), (0.033, 0.055))
     ]
-    thumb = [shape("box", (0.07, 0.02, 0.02), (0.075, -0.03, 0.026), (0, -0.35, 0))]
+    thumb = [shape("box", (0.065, 0.02, 0.018), (0.118, -0.03, 0.028), (0, 0.35, 0))]
     chain = [
         ("shoulder_yaw", "base", "shoulder1", 0, "0 0 1"),
         ("shoulder_pitch", "shoulder1", "shoulder2", 0, "0 1 0"),

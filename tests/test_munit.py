@@ -1,0 +1,202 @@
+"""MUNIT: the losses against numbers worked out by hand, the parts, and a training that resumes."""
+
+import numpy as np
+import pytest
+import torch
+from torch import nn
+
+from lbw_minimal import munit
+from lbw_minimal.munit import MUNIT, adain, discriminator_losses, generator_losses, swap
+from lbw_minimal.training import Checkpoint, InputError, save_state
+
+
+class Stub:
+    """Networks of numbers: an image v has content 10 v and style v in "x", 10 v + 1 and v + 2 in "y"; images
+    are decoded to c + s in "x" and to c + 2 s in "y"."""
+
+    def content(self, image, domain):
+        return 10 * image + (domain == "y")
+
+    def style(self, image, domain):
+        return image + 2 * (domain == "y")
+
+    def decode(self, c, s, domain):
+        return c + (2 * s if domain == "y" else s)
+
+
+CRITICS = {"x": lambda image: [image / 100, image / 50], "y": lambda image: [image * 0]}
+
+
+def image(value):
+    return torch.full((1, 1, 2, 2), float(value))
+
+
+@pytest.fixture(scope="module")
+def by_hand():
+    """x = 1 and y = 2, so c_x = 10, c_y = 21, s_x = 1, s_y = 4, G_X(c_y, s_x) = 22, G_Y(c_x, s_y) = 18."""
+    x, y = image(1), image(2)
+    losses = generator_losses(Stub(), CRITICS, x, y, swap(Stub(), x, y))
+    return {name: loss.item() for name, loss in losses.items()}
+
+
+def test_swap_decodes_each_content_with_the_other_domains_style():
+    swapped = swap(Stub(), image(1), image(2))
+    assert [v.mean().item() for v in swapped] == [10, 21, 1, 4, 22, 18]
+
+
+@pytest.mark.parametrize(
+    "name, value",
+    [
+        ("L_GAN^x", ((0.22 - 1) ** 2 + (0.44 - 1) ** 2) / 2),  # the mean over scales
+        ("L_GAN^y", 1.0),  # D_Y says 0, should say 1
+        ("L_rec^x", 10 + 1 - 1),  # G_X(10, 1) against x = 1
+        ("L_rec^y", 21 + 2 * 4 - 2),  # G_Y(21, 4) against y = 2
+        ("L_rec^c_x", 10 * 18 + 1 - 10),  # E_Y^c(18) against c_x
+        ("L_rec^c_y", 10 * 22 - 21),  # E_X^c(22) against c_y
+        ("L_rec^s_x", 22 - 1),  # E_X^s(G_X(c_y, s_x)) against s_x
+        ("L_rec^s_y", 18 + 2 - 4),  # E_Y^s(G_Y(c_x, s_y)) against s_y
+        ("L_cyc^x", 181 + 1 - 1),  # G_X(181, 1) against x
+        ("L_cyc^y", 220 + 2 * 4 - 2),  # G_Y(220, 4) against y
+    ],
+)
+def test_loss_equals_the_sum_done_by_hand(by_hand, name, value):
+    assert by_hand[name] == pytest.approx(value)
+
+
+def test_style_loss_compares_styles_of_the_same_domain(by_hand):
+    # The known bug takes E_X^s of the Y translation: |E_X^s(18) - s_x| = 17, |E_Y^s(22) - s_y| = 20.
+    assert (by_hand["L_rec^s_x"], by_hand["L_rec^s_y"]) == (21, 16)
+
+
+def test_total_loss_is_equation_5_plus_ten_times_the_cycle():
+    names = ["L_GAN", "L_rec", "L_rec^c_", "L_rec^s_", "L_cyc"]
+    L = {f"{n}{'' if n[-1] == '_' else '^'}{d}": torch.tensor(10.0**i) for i, n in enumerate(names) for d in "xy"}
+    assert munit.total_loss(L).item() == 2 * (1 + 10 * 10 + 100 + 1000 + 10 * 10000)
+
+
+def test_critics_lose_nothing_only_on_ones_for_real_and_zeros_for_translated():
+    same = {"x": lambda v: [v], "y": lambda v: [v, v]}
+    losses = discriminator_losses(same, image(1), image(3), image(0), image(0.5))
+    assert losses["L_D^x"].item() == 0
+    assert losses["L_D^y"].item() == (3 - 1) ** 2 + 0.5**2
+
+
+def test_critics_step_sends_no_gradient_to_the_generator():
+    made = image(0.5).requires_grad_()
+    critic = nn.Conv2d(1, 1, 1)
+    losses = discriminator_losses({d: lambda v: [critic(v)] for d in "xy"}, image(1), image(1), made, made)
+    sum(losses.values()).backward()
+    assert made.grad is None and critic.weight.grad is not None
+
+
+def test_weight_multiplies_image_and_cycle_losses_pixel_by_pixel():
+    x, y = image(1), image(2)
+    weight = torch.tensor([1.0, 1.0, 1.0, 5.0]).view(1, 1, 2, 2)  # mean 2
+    plain = generator_losses(Stub(), CRITICS, x, y, swap(Stub(), x, y))
+    heavy = generator_losses(Stub(), CRITICS, x, y, swap(Stub(), x, y), weight_x=weight)
+    changed = {name for name in plain if plain[name] != heavy[name]}
+    assert changed == {"L_rec^x", "L_cyc^x"} and heavy["L_rec^x"] == 2 * plain["L_rec^x"]
+
+
+def test_weight_is_one_on_the_median_frame_and_more_where_something_moved():
+    frames = np.full((3, 84, 84, 3), 100, np.uint8)
+    frames[0, 10, 20] = 151  # 0.4 of the range -1..1 in all three channels
+    _, weight = munit._Domain(frames, torch.device("cpu")).batch(np.random.default_rng(0), 20)
+    assert torch.unique(weight).tolist() == pytest.approx([1.0, 1 + munit.MOTION * 0.4])
+
+
+def test_adain_gives_every_channel_the_mean_and_deviation_of_the_style():
+    mean, std = torch.randn(2, 5), torch.rand(2, 5) + 0.5
+    h = adain(3 * torch.randn(2, 5, 21, 21) + 7, mean, std)
+    assert torch.allclose(h.mean((2, 3)), mean, atol=1e-4)
+    assert torch.allclose(h.std((2, 3), correction=0), std, atol=1e-4)
+
+
+def test_content_encoder_is_one_network_when_shared_and_two_when_not():
+    shared, apart = MUNIT(2), MUNIT(2, shared_content=False)
+    x = torch.randn(1, 3, 84, 84)
+    assert torch.equal(shared.content(x, "x"), shared.content(x, "y"))
+    assert not torch.equal(apart.content(x, "x"), apart.content(x, "y"))
+    one_encoder = sum(p.numel() for p in shared.E_c["x"].parameters())
+    count = [sum(p.numel() for p in model.parameters()) for model in (shared, apart)]
+    assert count[1] - count[0] == one_encoder
+
+
+def test_translation_of_a_frame_does_not_depend_on_the_frames_beside_it():
+    model, frames = MUNIT(2).eval(), np.random.default_rng(0).integers(0, 256, (40, 84, 84, 3), np.uint8)
+    s_y = munit.robot_style(model, frames)
+    video = munit.translate(model, frames, s_y)
+    assert video.shape == frames.shape and video.dtype == np.uint8 and s_y.shape == (8,)
+    alone = munit.translate(model, frames[35:36], s_y)
+    assert np.abs(video[35].astype(int) - alone[0]).max() <= 1  # one style for all; 1 for rounding
+
+
+def test_frames_survive_the_way_to_images_and_back():
+    frames = np.arange(2 * 4 * 8 * 3, dtype=np.uint8).reshape(2, 4, 8, 3)
+    images = munit.to_images(frames)
+    assert images.shape == (2, 3, 4, 8) and np.array_equal(munit.to_frames(images), frames)
+
+
+def test_file_carries_sizes_weights_and_task(tmp_path):
+    model = MUNIT(2, style_dim=3, blocks=1, shared_content=False)
+    munit.save(tmp_path / "munit.safetensors", model, "push")
+    loaded, task = munit.load(tmp_path / "munit.safetensors")
+    assert task == "push" and loaded.sizes == model.sizes
+    assert all(torch.equal(a, b) for a, b in zip(loaded.parameters(), model.parameters(), strict=True))
+
+
+def test_file_of_another_network_is_refused(tmp_path):
+    save_state(tmp_path / "other.safetensors", {"kind": "transporter"})
+    with pytest.raises(InputError, match=r"other\.safetensors: not the weights of a MUNIT"):
+        munit.load(tmp_path / "other.safetensors")
+
+
+@pytest.fixture(scope="module")
+def videos():
+    """A square that moves, dark on light for the human, light on dark for the robot."""
+    human, robot = np.full((20, 84, 84, 3), 150, np.uint8), np.full((20, 84, 84, 3), 100, np.uint8)
+    for t in range(20):
+        human[t, 40:52, 3 * t : 3 * t + 12] = (60, 60, 160)
+        robot[t, 3 * t : 3 * t + 12, 40:52] = (200, 160, 60)
+    return human, robot
+
+
+class Killed(Exception):
+    pass
+
+
+class DiesAfter(Checkpoint):
+    """Saves at every step and kills the training after some."""
+
+    def __init__(self, path, steps):
+        super().__init__(path, seconds=0)
+        self.left = steps
+
+    def save(self, make_state, force=False):
+        super().save(make_state, force=True)
+        self.left -= 1
+        if not self.left:
+            raise Killed
+
+
+def test_training_killed_and_resumed_ends_as_if_never_killed(videos, tmp_path, monkeypatch):
+    monkeypatch.setattr(munit, "LOG_EVERY", 2)  # killed at step 3: between two rows of the log
+    small = dict(iterations=5, seed=1, width=2, batch=2)
+    whole, whole_log = munit.train(*videos, **small)
+    with pytest.raises(Killed):
+        munit.train(*videos, **small, checkpoint=DiesAfter(tmp_path / "munit", 3))
+    resumed, resumed_log = munit.train(*videos, **small, checkpoint=Checkpoint(tmp_path / "munit"))
+    assert all(torch.equal(a, b) for a, b in zip(whole.parameters(), resumed.parameters(), strict=True))
+    assert whole_log == resumed_log and [row["step"] for row in resumed_log] == [2, 4]
+
+
+def test_another_seed_gives_another_model(videos):
+    a, b = (munit.train(*videos, iterations=1, seed=seed, width=2, batch=1)[0] for seed in (0, 1))
+    assert not torch.equal(a.G["x"].out.weight, b.G["x"].out.weight)
+
+
+def test_short_training_halves_reconstruction_and_cycle_loss(videos, monkeypatch):
+    monkeypatch.setattr(munit, "LOG_EVERY", 10)
+    _, log = munit.train(*videos, iterations=60, seed=0, width=8, batch=2)
+    for name in ("L_rec^x", "L_rec^y", "L_cyc^x", "L_cyc^y"):
+        assert log[-1][name] < 0.5 * log[0][name]
