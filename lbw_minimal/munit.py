@@ -3,14 +3,13 @@
 The content code c says where things are, the style code s how a domain looks: G_Y(c_x, s_y) is human frame
 x as the robot's camera would see it. In: videos (T, 84, 84, 3) uint8 of both domains. Out: the networks, and
 the translated video. Not in the paper, because without them small objects vanish or wall and table swap
-their brightness: a cycle loss, L1 weighted by the distance from the median frame, and a least-squares GAN.
+their brightness: a cycle loss, losses weighted by the distance from the median frame, least squares.
 """
 
 from __future__ import annotations
 
 import copy
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import torch
@@ -29,14 +28,16 @@ from lbw_minimal.training import (
 
 LAMBDA_IMAGE, LAMBDA_CONTENT, LAMBDA_STYLE = 10.0, 1.0, 1.0  # Eq. 5; MUNIT's own values
 LAMBDA_CYCLE = 10.0  # not in the paper: MUNIT's authors add it where pixels must stay aligned, as here
-MOTION = 4.0  # not in the paper: an L1 of weight 1 everywhere forgets what covers 1 % of the picture
-LEARNING_RATE = 2e-4  # of both Adams, down to 0 over the second half
+# Not in the paper: weights of what differs from the median frame, see `motion_weight`.
+MOTION_L1 = 4.0  # with 0 the L1 losses forget the object, which covers 1 % of the picture
+MOTION_GAN = 20.0  # with 0 four fifths of the patches are wall, and the critics hardly look at the arm
+LEARNING_RATE = 4e-4  # of both Adams, down to 0 over the second half
 AVERAGE = 0.995  # decay a step of the averaged weights, which flicker less from frame to frame
 LOG_EVERY = 50  # steps
 
 
 def adain(h: torch.Tensor, mean: torch.Tensor | None = None, std: torch.Tensor | None = None) -> torch.Tensor:
-    """h (B, C, H, W) with each channel of each image brought to that mean and std (B, C), by default 0 and 1."""
+    """h (B, C, H, W) with each channel of each image brought to mean and std (B, C), by default 0 and 1."""
     B, C, H, W = h.shape
     # Batch norm over B * C channels is this very formula in one pass: 3 times faster on a CPU than var_mean.
     mean, std = (None if p is None else p.float().reshape(-1) for p in (mean, std))
@@ -101,7 +102,7 @@ class MUNIT(nn.Module):
         super().__init__()
         self.sizes = dict(width=width, style_dim=style_dim, blocks=blocks, shared_content=shared_content)
         E_c = _ContentEncoder(width, blocks)
-        # Shared, equal things of both domains start with equal codes; apart, the critics alone must match them.
+        # Shared, equal things start with equal codes in both domains; apart, the critics alone match them.
         self.E_c = nn.ModuleDict({"x": E_c, "y": E_c if shared_content else _ContentEncoder(width, blocks)})
         self.E_s = nn.ModuleDict({domain: _style_encoder(style_dim) for domain in "xy"})
         self.G = nn.ModuleDict({domain: _Decoder(width, style_dim, blocks) for domain in "xy"})
@@ -120,7 +121,7 @@ class MUNIT(nn.Module):
 
 
 class Critic(nn.Module):
-    """D of one domain: scores of all patches of 22 and 44 pixels of (B, 3, 84, 84), 1 real and 0 translated."""
+    """D of one domain: scores of all patches of 22 and 44 pixels of (B, 3, 84, 84), 1 real, 0 translated."""
 
     def __init__(self, width: int = 32):
         super().__init__()
@@ -138,51 +139,57 @@ class Critic(nn.Module):
         return [self.scales[0](image), self.scales[1](F.avg_pool2d(image, 2))]  # (B, 1, 10, 10), (B, 1, 5, 5)
 
 
-class Swap(NamedTuple):
-    """The codes of a batch of both domains and their crosswise translations."""
+def motion_weight(image: torch.Tensor, median: torch.Tensor | None, gain: float) -> torch.Tensor:
+    """1 + gain * distance of image (B, 3, H, W) from the median frame (1, 3, H, W) of its domain: (B, 1, H, W).
 
-    c_x: torch.Tensor
-    c_y: torch.Tensor
-    s_x: torch.Tensor
-    s_y: torch.Tensor
-    x_of_y: torch.Tensor  # G_X(c_y, s_x)
-    y_of_x: torch.Tensor  # G_Y(c_x, s_y)
-
-
-def swap(model: MUNIT, x: torch.Tensor, y: torch.Tensor) -> Swap:
-    """Encode x and y, both (B, 3, 84, 84), and decode each content with the other's style."""
-    c_x, c_y = model.content(x, "x"), model.content(y, "y")
-    s_x, s_y = model.style(x, "x"), model.style(y, "y")
-    return Swap(c_x, c_y, s_x, s_y, model.decode(c_y, s_x, "x"), model.decode(c_x, s_y, "y"))
+    Not in the paper; without a median it is 1 everywhere, which is the paper.
+    """
+    if median is None:
+        return torch.ones_like(image[:, :1])
+    return 1 + gain * (image.detach().float() - median).abs().mean(1, keepdim=True)
 
 
 def _l1(a, b, weight=1.0):
     return (weight * (a.float() - b.float()).abs()).mean()
 
 
-def _least_squares(scores, target):
-    # Not in the paper: the logarithms of Eq. 1 give a generator that is losing no gradient; this does.
-    return sum(((score.float() - target) ** 2).mean() for score in scores) / len(scores)
+def _least_squares(scores, target, weight):
+    # Not in the paper: the logarithms of Eq. 1 leave a losing generator without a gradient, squares do not.
+    loss = 0.0
+    for score in scores:  # (B, 1, h, w) of one scale
+        cells = F.adaptive_avg_pool2d(weight, score.shape[2:])
+        loss = loss + (cells / cells.mean() * (score.float() - target) ** 2).mean() / len(scores)
+    return loss
 
 
-def generator_losses(model, critics, x, y, swapped, weight_x=1.0, weight_y=1.0) -> dict[str, torch.Tensor]:
-    """The generators' and encoders' side of Eq. 1 to 4 by the paper's names, and the cycle loss L_cyc.
+def swap(model: MUNIT, x: torch.Tensor, y: torch.Tensor) -> tuple[torch.Tensor, ...]:
+    """c_x, c_y, s_x, s_y, G_X(c_y, s_x), G_Y(c_x, s_y) of images x and y (B, 3, 84, 84) in [-1, 1]."""
+    c_x, c_y = model.content(x, "x"), model.content(y, "y")
+    s_x, s_y = model.style(x, "x"), model.style(y, "y")
+    return c_x, c_y, s_x, s_y, model.decode(c_y, s_x, "x"), model.decode(c_x, s_y, "y")
 
-    x, y (B, 3, 84, 84) in [-1, 1]; weight_x, weight_y (B, 1, 84, 84) weigh the L1 of Eq. 2 and of the cycle.
+
+def generator_losses(model, critics, x, y, swapped, median_x=None, median_y=None) -> dict[str, torch.Tensor]:
+    """The encoders' and generators' side of Eq. 1 to 4 by the paper's names, and the cycle loss L_cyc.
+
+    x, y (B, 3, 84, 84) in [-1, 1], `swapped` from `swap`; medians (1, 3, 84, 84) switch the motion weights on.
     """
     c_x, c_y, s_x, s_y, x_of_y, y_of_x = swapped
     c_x_again, c_y_again = model.content(y_of_x, "y"), model.content(x_of_y, "x")
+    w_x, w_y = motion_weight(x, median_x, MOTION_L1), motion_weight(y, median_y, MOTION_L1)
+    w_x_of_y = motion_weight(x_of_y, median_x, MOTION_GAN)
+    w_y_of_x = motion_weight(y_of_x, median_y, MOTION_GAN)
     return {
-        "L_GAN^x": _least_squares(critics["x"](x_of_y), 1.0),  # Eq. 1
-        "L_GAN^y": _least_squares(critics["y"](y_of_x), 1.0),
-        "L_rec^x": _l1(model.decode(c_x, s_x, "x"), x, weight_x),  # Eq. 2
-        "L_rec^y": _l1(model.decode(c_y, s_y, "y"), y, weight_y),
+        "L_GAN^x": _least_squares(critics["x"](x_of_y), 1.0, w_x_of_y),  # Eq. 1
+        "L_GAN^y": _least_squares(critics["y"](y_of_x), 1.0, w_y_of_x),
+        "L_rec^x": _l1(model.decode(c_x, s_x, "x"), x, w_x),  # Eq. 2
+        "L_rec^y": _l1(model.decode(c_y, s_y, "y"), y, w_y),
         "L_rec^c_x": _l1(c_x_again, c_x),  # Eq. 3
         "L_rec^c_y": _l1(c_y_again, c_y),
         "L_rec^s_x": _l1(model.style(x_of_y, "x"), s_x),  # Eq. 4
         "L_rec^s_y": _l1(model.style(y_of_x, "y"), s_y),
-        "L_cyc^x": _l1(model.decode(c_x_again, s_x, "x"), x, weight_x),  # not in the paper
-        "L_cyc^y": _l1(model.decode(c_y_again, s_y, "y"), y, weight_y),
+        "L_cyc^x": _l1(model.decode(c_x_again, s_x, "x"), x, w_x),  # not in the paper
+        "L_cyc^y": _l1(model.decode(c_y_again, s_y, "y"), y, w_y),
     }
 
 
@@ -198,13 +205,15 @@ def total_loss(L: dict[str, torch.Tensor]) -> torch.Tensor:
     )
 
 
-def discriminator_losses(critics, x, y, x_of_y, y_of_x) -> dict[str, torch.Tensor]:
-    """The critics' side of Eq. 1, in least squares: real frames x, y to 1, translations to 0."""
-    x_of_y, y_of_x = x_of_y.detach(), y_of_x.detach()
-    return {
-        "L_D^x": _least_squares(critics["x"](x), 1.0) + _least_squares(critics["x"](x_of_y), 0.0),  # Eq. 1
-        "L_D^y": _least_squares(critics["y"](y), 1.0) + _least_squares(critics["y"](y_of_x), 0.0),
-    }
+def discriminator_losses(critics, x, y, swapped, median_x=None, median_y=None) -> dict[str, torch.Tensor]:
+    """The critics' side of Eq. 1 in least squares: real x and y to 1, the translations in `swapped` to 0."""
+    losses = {}
+    for domain, real, made, median in (("x", x, swapped[4], median_x), ("y", y, swapped[5], median_y)):
+        made = made.detach()
+        losses[f"L_D^{domain}"] = _least_squares(
+            critics[domain](real), 1.0, motion_weight(real, median, MOTION_GAN)
+        ) + _least_squares(critics[domain](made), 0.0, motion_weight(made, median, MOTION_GAN))
+    return losses
 
 
 def to_images(frames: np.ndarray, device: torch.device | str = "cpu") -> torch.Tensor:
@@ -224,18 +233,12 @@ def _bfloat16(device):
     return torch.autocast(device.type, torch.bfloat16, enabled=able)
 
 
-class _Domain:
-    """Frames of one domain with their median, drawn in batches with their L1 weights."""
+def _draw(frames, n, rng, device):
+    return to_images(frames[rng.integers(len(frames), size=n)], device)
 
-    def __init__(self, frames, device):
-        self.frames, self.device = frames, device
-        self.median = to_images(np.median(frames, axis=0).astype(np.uint8)[None], device)
 
-    def batch(self, rng, size):
-        images = to_images(self.frames[rng.integers(len(self.frames), size=size)], self.device)
-        return images, 1 + MOTION * (images - self.median).abs().mean(
-            1, keepdim=True
-        )  # weight (B, 1, 84, 84)
+def _median(frames, device):
+    return to_images(np.median(frames, axis=0, keepdims=True).astype(np.uint8), device)  # (1, 3, 84, 84)
 
 
 def train(
@@ -247,21 +250,22 @@ def train(
     width: int = 20,
     batch: int = 4,
     device: str = "cpu",
-    checkpoint: Checkpoint = Checkpoint(None),
+    checkpoint: Checkpoint | None = None,
 ) -> tuple[MUNIT, list[dict]]:
     """Train on human and robot frames (T, 84, 84, 3) uint8; returns the model of averaged weights and a log.
 
     A row of the log holds `step`, each loss's mean since the row before, and how many grey levels (0-255) the
-    mean translation is off that domain's mean frame: `mean_image^x`, `mean_image^y`. Different poses cost a few;
-    over 20 two regions, such as wall and table, have swapped their brightness.
+    mean translation is off that domain's mean frame: `mean_image^x`, `mean_image^y`. Different poses cost a
+    few; over 20 two regions, such as wall and table, have swapped their brightness.
     """
+    checkpoint = checkpoint or Checkpoint(None)
     rng = seed_everything(seed)
     device = pick_device(device)
     model = MUNIT(width).to(device, memory_format=torch.channels_last)
     critics = nn.ModuleDict({d: Critic() for d in "xy"}).to(device, memory_format=torch.channels_last)
     average = copy.deepcopy(model)
     adam_G, adam_D = (torch.optim.Adam(m.parameters(), betas=(0.5, 0.999)) for m in (model, critics))
-    X, Y = _Domain(human, device), _Domain(robot, device)
+    median_x, median_y = _median(human, device), _median(robot, device)
     stateful = dict(model=model, critics=critics, average=average, adam_G=adam_G, adam_D=adam_D)
 
     step, log, sums = 0, [], {}
@@ -279,20 +283,19 @@ def train(
     while step < iterations:
         for group in adam_G.param_groups + adam_D.param_groups:
             group["lr"] = LEARNING_RATE * min(1.0, 2 * (1 - step / iterations))
-        x, weight_x = X.batch(rng, batch)
-        y, weight_y = Y.batch(rng, batch)
+        x, y = _draw(human, batch, rng, device), _draw(robot, batch, rng, device)
 
         critics.requires_grad_(False)  # the generators' step learns through the critics, not in them
         with _bfloat16(device):
             swapped = swap(model, x, y)
-            L_G = generator_losses(model, critics, x, y, swapped, weight_x, weight_y)
+            L_G = generator_losses(model, critics, x, y, swapped, median_x, median_y)
         adam_G.zero_grad()
         total_loss(L_G).backward()
         adam_G.step()
 
         critics.requires_grad_(True)
         with _bfloat16(device):  # on the translations made above: making new ones costs a fifth more
-            L_D = discriminator_losses(critics, x, y, swapped.x_of_y, swapped.y_of_x)
+            L_D = discriminator_losses(critics, x, y, swapped, median_x, median_y)
         adam_D.zero_grad()
         sum(L_D.values()).backward()
         adam_D.step()

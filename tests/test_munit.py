@@ -70,13 +70,17 @@ def test_style_loss_compares_styles_of_the_same_domain(by_hand):
 
 def test_total_loss_is_equation_5_plus_ten_times_the_cycle():
     names = ["L_GAN", "L_rec", "L_rec^c_", "L_rec^s_", "L_cyc"]
-    L = {f"{n}{'' if n[-1] == '_' else '^'}{d}": torch.tensor(10.0**i) for i, n in enumerate(names) for d in "xy"}
+    L = {
+        f"{n}{'' if n[-1] == '_' else '^'}{d}": torch.tensor(10.0**i)
+        for i, n in enumerate(names)
+        for d in "xy"
+    }
     assert munit.total_loss(L).item() == 2 * (1 + 10 * 10 + 100 + 1000 + 10 * 10000)
 
 
 def test_critics_lose_nothing_only_on_ones_for_real_and_zeros_for_translated():
     same = {"x": lambda v: [v], "y": lambda v: [v, v]}
-    losses = discriminator_losses(same, image(1), image(3), image(0), image(0.5))
+    losses = discriminator_losses(same, image(1), image(3), (None,) * 4 + (image(0), image(0.5)))
     assert losses["L_D^x"].item() == 0
     assert losses["L_D^y"].item() == (3 - 1) ** 2 + 0.5**2
 
@@ -84,25 +88,35 @@ def test_critics_lose_nothing_only_on_ones_for_real_and_zeros_for_translated():
 def test_critics_step_sends_no_gradient_to_the_generator():
     made = image(0.5).requires_grad_()
     critic = nn.Conv2d(1, 1, 1)
-    losses = discriminator_losses({d: lambda v: [critic(v)] for d in "xy"}, image(1), image(1), made, made)
+    critics = {d: lambda v: [critic(v)] for d in "xy"}
+    losses = discriminator_losses(critics, image(1), image(1), (None,) * 4 + (made, made))
     sum(losses.values()).backward()
     assert made.grad is None and critic.weight.grad is not None
 
 
-def test_weight_multiplies_image_and_cycle_losses_pixel_by_pixel():
+def test_motion_weight_is_one_on_the_median_frame_and_grows_with_the_distance():
+    median, frame = torch.zeros(1, 3, 2, 2), torch.zeros(1, 3, 2, 2)
+    frame[0, :, 0, 1] = torch.tensor([0.2, -0.4, 0.6])  # mean distance 0.4
+    assert torch.allclose(munit.motion_weight(frame, median, 5.0), torch.tensor([[[[1.0, 3.0], [1.0, 1.0]]]]))
+
+
+def test_motion_weighs_image_and_cycle_losses_pixel_by_pixel():
     x, y = image(1), image(2)
-    weight = torch.tensor([1.0, 1.0, 1.0, 5.0]).view(1, 1, 2, 2)  # mean 2
+    median = torch.tensor([1.0, 1.0, 1.0, 0.0]).view(1, 1, 2, 2)  # the weights' mean is 1 + MOTION_L1 / 4
     plain = generator_losses(Stub(), CRITICS, x, y, swap(Stub(), x, y))
-    heavy = generator_losses(Stub(), CRITICS, x, y, swap(Stub(), x, y), weight_x=weight)
-    changed = {name for name in plain if plain[name] != heavy[name]}
-    assert changed == {"L_rec^x", "L_cyc^x"} and heavy["L_rec^x"] == 2 * plain["L_rec^x"]
+    heavy = generator_losses(Stub(), CRITICS, x, y, swap(Stub(), x, y), median_x=median)
+    assert heavy["L_rec^x"] == (1 + munit.MOTION_L1 / 4) * plain["L_rec^x"]
+    assert heavy["L_cyc^x"] == (1 + munit.MOTION_L1 / 4) * plain["L_cyc^x"]
+    assert heavy["L_rec^y"] == plain["L_rec^y"]
 
 
-def test_weight_is_one_on_the_median_frame_and_more_where_something_moved():
-    frames = np.full((3, 84, 84, 3), 100, np.uint8)
-    frames[0, 10, 20] = 151  # 0.4 of the range -1..1 in all three channels
-    _, weight = munit._Domain(frames, torch.device("cpu")).batch(np.random.default_rng(0), 20)
-    assert torch.unique(weight).tolist() == pytest.approx([1.0, 1 + munit.MOTION * 0.4])
+def test_motion_makes_critics_judge_the_arm_not_the_wall():
+    median, made = image(0), image(0)
+    made[..., 1, 1] = 1.0  # moved there: weight 1 + MOTION_GAN, elsewhere 1
+    critics = {d: lambda v: [v] for d in "xy"}  # errors against 0 for translated: 1 there, 0 elsewhere
+    L = discriminator_losses(critics, image(1), image(1), (None,) * 4 + (made, made), median_x=median)
+    share = (1 + munit.MOTION_GAN) / (4 + munit.MOTION_GAN)
+    assert L["L_D^x"].item() == pytest.approx(share) and L["L_D^y"].item() == pytest.approx(1 / 4)
 
 
 def test_adain_gives_every_channel_the_mean_and_deviation_of_the_style():

@@ -120,8 +120,8 @@ def test_the_same_seed_gives_the_same_frames_in_two_processes():
 
 
 def test_random_data_moves_the_cube():
-    env = make("LbW-Push-v0").unwrapped
-    _, truth = record_random(env, 200, seed=0)
+    env = make("LbW-Push-v0", observation="state").unwrapped
+    _, truth = record_random(env, 1000, seed=0)
     moved = np.abs(np.diff(truth[:, 2])) > 0.2
     assert truth[:, 2].std() > 5  # pixels
-    assert moved.mean() > 0.04
+    assert moved.mean() > 0.06  # of all steps

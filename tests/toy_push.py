@@ -1,40 +1,40 @@
 """A toy of the push task for tests: frames drawn with rectangles, dynamics in a dozen lines.
 
-A gripper on an arm (three visible parts) pushes a puck along a table, seen from the side; depth is
-invisible. It has what makes the real task hard for a reward: a puck that only contact moves, a
-demonstration that pauses and is slower than the robot, keypoints with a pixel of noise.
+A gripper on an arm (three visible parts) pushes a puck along a table, seen from the side. It has what
+makes the real task hard for a reward: a puck that only contact moves, a demonstration that pauses and
+is slower than the robot, keypoints with half a pixel of noise.
 """
 
 import gymnasium as gym
 import numpy as np
 
 BASE, START, PUCK, GOAL = np.array([-0.9, -0.3]), np.array([-0.5, 0.0]), 0.0, 0.55
-TABLE, HALF_PUCK, HALF_GRIPPER, STEP = 0.6, 0.1, 0.06, 0.12  # all in keypoint units, 1 = half the image
+TABLE, HALF_PUCK, HALF_GRIPPER, STEP = 0.6, 0.1, 0.06, 0.08  # all in keypoint units, 1 = half the image
 COLOURS = (60, 120, 180, 240)  # elbow, wrist, gripper, puck
 
 
 class ToyPush(gym.Env):
     observation_space = gym.spaces.Box(0, 255, (84, 84, 3), np.uint8)
-    action_space = gym.spaces.Box(-1, 1, (3,), np.float32)  # right, down, depth
+    action_space = gym.spaces.Box(-1, 1, (3,), np.float32)  # right, down, and depth, held by walls
     horizon = 50
 
     def reset(self, seed=None, options=None):
         super().reset(seed=seed)
         self.position = START + self.np_random.uniform(-0.02, 0.02, 2)
-        self.velocity, self.depth = np.zeros(2), 0.0
+        self.velocity = np.zeros(2)
         self.puck, self.puck_velocity, self.t = PUCK + self.np_random.uniform(-0.02, 0.02), 0.0, 0
         return self.frame(), {}
 
     def step(self, action):
         a = np.clip(action, -1, 1)
         self.velocity = 0.5 * self.velocity + 0.5 * STEP * a[:2]
-        before, self.position = self.position, np.clip(self.position + self.velocity, [-0.9, -0.6], [0.95, TABLE - HALF_GRIPPER])
-        self.depth = np.clip(self.depth + STEP * a[2], -0.6, 0.6)
+        before = self.position
+        self.position = np.clip(before + self.velocity, [-0.9, -0.6], [0.95, TABLE - HALF_GRIPPER])
         self.puck_velocity *= 0.5  # friction
         self.puck = np.clip(self.puck + self.puck_velocity, -0.8, 0.9)
         x, y = self.position
         reach = HALF_PUCK + HALF_GRIPPER
-        if y > TABLE - 2 * HALF_PUCK and abs(x - self.puck) < reach and abs(self.depth) < 0.25:
+        if y > TABLE - 2 * HALF_PUCK and abs(x - self.puck) < reach:
             if before[1] <= TABLE - 2 * HALF_PUCK:  # came from above: stands on the puck
                 self.position[1] = TABLE - 2 * HALF_PUCK
             else:
@@ -53,8 +53,7 @@ class ToyPush(gym.Env):
     def frame(self):
         image = np.zeros((84, 84, 3), np.uint8)
         half = np.array([[0.06, 0.06], [0.06, 0.06], [HALF_GRIPPER] * 2, [HALF_PUCK] * 2])
-        centre = self.parts() * (1 + 0.05 * self.depth)  # what comes closer moves outward, a little
-        low, high = (np.clip((centre + s * half + 1) * 42, 0, 84).round().astype(int) for s in (-1, 1))
+        low, high = (np.clip((self.parts() + s * half + 1) * 42, 0, 84).round().astype(int) for s in (-1, 1))
         for (x0, y0), (x1, y1), colour in zip(low, high, COLOURS, strict=True):
             image[y0:y1, x0:x1] = colour
         return image
