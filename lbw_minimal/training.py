@@ -42,7 +42,7 @@ def seed_everything(seed: int) -> np.random.Generator:
 def write_atomic(path: Path | str, data: bytes | str) -> None:
     """Write a file so that a kill at any moment leaves the old file or the new one."""
     path = Path(path)
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    part = path.with_name(f".{path.name}.part")
     with open(part, "wb") as f:
         f.write(data.encode() if isinstance(data, str) else data)
         f.flush()

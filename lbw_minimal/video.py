@@ -7,6 +7,7 @@ Pauses are not cut here but on the keypoint trajectory, where stillness does not
 
 from __future__ import annotations
 
+import contextlib
 import mmap
 import os
 import tempfile
@@ -18,11 +19,8 @@ import numpy as np
 
 from lbw_minimal.training import InputError, write_atomic
 
-# FFmpeg prints to stderr on every bad file, beside the one sentence that we say. OpenCV asks at each opening.
-os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
-
 SIZE = 84  # pixels, both sides of a frame
-MAX_FRAMES = 2000  # 42 MB; the longest video of the paper has 3,150 robot frames, a human one 1,056
+MAX_FRAMES = 2000  # 42 MB; the human videos of the paper have 398 to 1,056
 LOOK_AT = 60  # frames that the checks of motion and camera look at, spread over the video
 # Grey levels, the local mean taken off. Sensor noise of 16 levels changes 0.04 % of a frame's pixels by
 # more, the smallest motion among our clips (a reach) 1.8 %.
@@ -47,7 +45,8 @@ def read(path: Path | str) -> tuple[np.ndarray, list[str]]:
         raise InputError(f"{path}: this is a folder; give the video file itself.")
     if not path.exists():
         raise InputError(f"{path}: there is no such file; check the path.")
-    frames, every, count = _decode(path)
+    with _silence():
+        frames, every, count = _decode(path)
     if count == 1:
         raise InputError(f"{path}: the video has a single frame; give one in which the arm does the task.")
     still = _high_pass(frames)
@@ -56,10 +55,26 @@ def read(path: Path | str) -> tuple[np.ndarray, list[str]]:
         raise InputError(f"{path}: nothing moves in the video; give one in which the arm does the task.")
     warnings = []
     if every > 1:
-        warnings.append(f"{path}: {count} frames are many; only every {every}th is used, {len(frames)} in all.")
+        warnings.append(f"{path}: {count} frames are many; every {every}th is used, {len(frames)} in all.")
     if _steadiness(still, background) < STEADY:
         warnings.append(f"{path}: the camera seems to move; put it on a stand, or keypoints will follow it.")
     return frames, warnings
+
+
+@contextlib.contextmanager
+def _silence():
+    """OpenCV and FFmpeg print to stderr on every bad file, beside the one sentence that we say."""
+    name = "OPENCV_FFMPEG_LOGLEVEL"  # read whenever a file is opened
+    level, asked = cv2.utils.logging.getLogLevel(), os.environ.get(name)
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    os.environ[name] = "-8"  # AV_LOG_QUIET
+    try:
+        yield
+    finally:
+        cv2.utils.logging.setLogLevel(level)
+        os.environ.pop(name)
+        if asked is not None:
+            os.environ[name] = asked
 
 
 def _decode(path):
@@ -68,19 +83,13 @@ def _decode(path):
     if not film.isOpened():
         raise InputError(f"{path}: {_why_closed(path)}")
     kept, every, count = [], 1, 0
-    while True:
-        ok, bgr = film.read()
-        if not ok:
-            break
-        if min(bgr.shape[:2]) < SIZE:
-            size = f"{bgr.shape[1]}x{bgr.shape[0]}"
-            raise InputError(f"{path}: {size} pixels are too few; give a video of {SIZE}x{SIZE} or more.")
-        if count % every == 0:
-            kept.append(_shrink(bgr))
+    while film.grab():
+        if count % every == 0:  # the colours of a phone's HDR cost 0.1 s a frame: only where it is kept
+            kept.append(_shrink(film.retrieve()[1], path))
             if len(kept) > MAX_FRAMES:  # the header's frame count may lie, so thin as they come
                 kept, every = kept[::2], 2 * every
         count += 1
-    stated = film.get(cv2.CAP_PROP_FRAME_COUNT)  # rounded from the duration in some formats: 5 % and one spare
+    stated = film.get(cv2.CAP_PROP_FRAME_COUNT)  # some formats round it from the duration
     if count < 0.95 * stated - 1:
         said = f"its header promises {stated:.0f} frames and {count} can be read"
         raise InputError(f"{path}: the video is cut short, {said}; copy or export it again.")
@@ -104,9 +113,11 @@ def _why_closed(path):
     return "the video has no frames that OpenCV can decode; record it again or export it as H.264."
 
 
-def _shrink(bgr):
+def _shrink(bgr, path):
     h, w = bgr.shape[:2]
     side = min(h, w)
+    if side < SIZE:
+        raise InputError(f"{path}: {w}x{h} pixels are too few; give a video of {SIZE}x{SIZE} or more.")
     top, left = (h - side) // 2, (w - side) // 2
     square = bgr[top : top + side, left : left + side]
     return cv2.cvtColor(cv2.resize(square, (SIZE, SIZE), interpolation=cv2.INTER_AREA), cv2.COLOR_BGR2RGB)

@@ -157,8 +157,8 @@ def human() -> ArmSpec:
     return ArmSpec(
         urdf=urdf,
         meshes=meshes,
-        base=(0.06, 0.0, 0.40),
-        home=(0.0, -0.75, 0.0, 1.75, 0.0, 0.57, 0.0),
+        base=(0.12, 0.0, 0.44),
+        home=(0.0, -0.60, 0.0, 1.75, 0.0, 0.42, 0.0),
         down=((0, 0, 1), (0, 1, 0), (-1, 0, 0)),
         effort=(90, 90, 60, 60, 20, 20, 20),
         reach_links=("hand",),
@@ -234,12 +234,17 @@ class Arm:
     def reset(self, tip: np.ndarray) -> None:
         """Put the tip at that position, pointing down, at rest, by Newton steps from the rest posture."""
         q = self.home.copy()
-        for _ in range(40):
+        for _ in range(60):
             self._set(q)
             error = self._error(tip)
-            if np.abs(error).max() < 1e-9:
+            length = np.abs(error).max()
+            if length < 1e-9:
                 break
-            q = q + np.linalg.pinv(self.jacobian(q)) @ error
+            inverse = np.linalg.pinv(self.jacobian(q))
+            posture = self.home - q
+            posture -= inverse @ (self.jacobian(q) @ posture)
+            # Short steps, and near the rest posture: a long one may land with the elbow upside down.
+            q = q + inverse @ error * min(1, 0.05 / length) + 0.2 * posture * (length > 1e-3)
         self.goal = np.array(tip, float)
 
     def _set(self, q):

@@ -1,0 +1,269 @@
+"""Video files: what goes wrong gets one sentence, what goes right keeps its frames, and writing is atomic."""
+
+import itertools
+import tracemalloc
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from lbw_minimal import video
+from lbw_minimal.training import InputError
+
+SHIPPED = Path(__file__).resolve().parent.parent / "tasks" / "videos"
+
+
+def room(size=84, seed=0):
+    """A still picture (size, size, 3) with edges in all directions: a room seen by a camera."""
+    picture = np.full((size, size, 3), 120, np.uint8)
+    rng = np.random.default_rng(seed)
+    for _ in range(25):
+        low, colour = rng.integers(0, size, 2), rng.integers(40, 200, 3).tolist()
+        high = low + rng.integers(size // 10, size // 4, 2)
+        cv2.rectangle(picture, low.tolist(), high.tolist(), colour, -1)
+    return picture
+
+
+def arm_moves(frames):
+    """The same frames with an arm that comes in from the left, a third of the picture wide at the end."""
+    frames = np.array(frames)
+    n, size = len(frames), frames.shape[1]
+    for t in range(n):
+        frames[t, size // 2 : 2 * size // 3, : size * (t + 1) // (3 * n)] = (220, 170, 140)
+    return frames
+
+
+def film(n=30, size=84):
+    return arm_moves(np.repeat(room(size)[None], n, axis=0))
+
+
+def encode(path, frames, codec="mp4v", fps=25):
+    """Frames as OpenCV writes them, without anything of `video.write`."""
+    h, w = frames[0].shape[:2]
+    out = cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, cv2.VideoWriter_fourcc(*codec), fps, (w, h))
+    for frame in frames:
+        out.write(np.ascontiguousarray(frame[..., ::-1]))
+    out.release()
+    return path.read_bytes()
+
+
+# Each writes a bad file of that name, and the words that its sentence must hold.
+def text(path):
+    path.write_text("this is no film\n" * 100)
+
+
+def half_an_mp4(path):
+    whole = encode(path, film())
+    path.write_bytes(whole[: len(whole) // 2])
+
+
+def half_an_avi(path):
+    """An avi states its length first and is readable up to where it was cut."""
+    whole = encode(path.with_suffix(".avi"), film(), "MJPG")
+    path.with_suffix(".avi").unlink()
+    path.write_bytes(whole[: len(whole) // 2])
+
+
+def empty_mp4(path):
+    cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, cv2.VideoWriter_fourcc(*"mp4v"), 25, (84, 84)).release()
+
+
+BAD = {
+    "missing": (lambda path: None, "there is no such file; check the path"),
+    "folder": (Path.mkdir, "this is a folder; give the video file itself"),
+    "text": (text, "not a video that OpenCV can read; give an mp4"),
+    "nothing inside": (Path.touch, "the file is empty; copy or export it again"),
+    "mp4 cut in half": (half_an_mp4, "cut short, its index is missing; copy or export it again"),
+    "avi cut in half": (
+        half_an_avi,
+        r"cut short, its header promises 30 frames and 1\d can be read; copy or",
+    ),
+    "zero frames": (empty_mp4, "no frames that OpenCV can decode; record it again or export it as H.264"),
+    "one frame": (lambda path: encode(path, film(1)), "a single frame; give one in which the arm does"),
+    "20x20": (lambda path: encode(path, film(30, 20)), "20x20 pixels are too few; give a video of 84x84 or"),
+    "no motion": (lambda path: encode(path, [room()] * 30), "nothing moves in the video; give one in which"),
+}
+
+
+@pytest.mark.parametrize("make, sentence", BAD.values(), ids=BAD.keys())
+def test_bad_file_gets_one_sentence_with_its_name_and_the_remedy(tmp_path, capfd, make, sentence):
+    path = tmp_path / "mine.mp4"
+    make(path)
+    before = sorted(tmp_path.rglob("*"))
+    capfd.readouterr()
+    with pytest.raises(InputError, match=rf"^{path}: .*{sentence}[^\n]*\.$"):
+        video.read(path)
+    assert sorted(tmp_path.rglob("*")) == before
+    assert capfd.readouterr() == ("", "")  # FFmpeg and OpenCV have nothing to add
+
+
+def shaken(frames, pixels):
+    """The inner 84x84 of larger frames, seen by a camera that wanders by that many pixels to each side."""
+    margin = (frames.shape[1] - 84) // 2
+    wander = np.rint(margin + pixels * np.sin(np.arange(len(frames))[:, None] * (0.5, 0.4))).astype(int)
+    return np.stack([f[y : y + 84, x : x + 84] for f, (x, y) in zip(frames, wander, strict=True)])
+
+
+def warnings_about(path, frames):
+    video.write(path, frames, 25)
+    return video.read(path)[1]
+
+
+def test_shaken_camera_is_warned_of(tmp_path):
+    (warning,) = warnings_about(tmp_path / "mine.mp4", shaken(film(30, 100), pixels=4))
+    assert (
+        warning.startswith(str(tmp_path / "mine.mp4"))
+        and "camera seems to move; put it on a stand" in warning
+    )
+
+
+def test_panned_camera_is_warned_of(tmp_path):
+    wide = film(30, 100)
+    assert warnings_about(tmp_path / "mine.mp4", [f[8:92, t // 3 : t // 3 + 84] for t, f in enumerate(wide)])
+
+
+def test_arm_before_a_steady_camera_is_not_warned_of(tmp_path):
+    assert warnings_about(tmp_path / "mine.mp4", shaken(film(30, 100), pixels=0)) == []
+
+
+def test_noise_and_changing_light_are_not_taken_for_a_moving_camera(tmp_path):
+    noise = np.random.default_rng(0).normal(0, 8, (30, 84, 84, 3))
+    light = 1 + 0.15 * np.sin(np.arange(30) / 5).reshape(30, 1, 1, 1)
+    encode(tmp_path / "mine.mp4", np.clip(film() * light + noise, 0, 255).astype(np.uint8))
+    assert video.read(tmp_path / "mine.mp4")[1] == []
+
+
+def test_noise_is_not_taken_for_motion(tmp_path):
+    noise = np.random.default_rng(0).normal(0, 16, (30, 84, 84, 3))
+    encode(tmp_path / "mine.mp4", np.clip(room() + noise, 0, 255).astype(np.uint8))
+    with pytest.raises(InputError, match="nothing moves"):
+        video.read(tmp_path / "mine.mp4")
+
+
+@pytest.mark.parametrize("path", sorted(SHIPPED.glob("*/*.mp4")), ids=lambda p: f"{p.parent.name}/{p.stem}")
+def test_shipped_video_passes_without_a_warning(path):
+    frames, warnings = video.read(path)
+    assert frames.shape[1:] == (84, 84, 3) and warnings == []
+
+
+def test_shipped_videos_take_less_than_three_megabytes():
+    assert sum(path.stat().st_size for path in SHIPPED.glob("*/*.mp4")) < 3e6
+
+
+def test_frames_written_come_back_in_number_rate_and_looks(tmp_path):
+    frames = film(25)
+    video.write(tmp_path / "mine.mp4", frames, 12.5)
+    back, warnings = video.read(tmp_path / "mine.mp4")
+    assert back.shape == frames.shape and back.dtype == np.uint8 and warnings == []
+    assert cv2.VideoCapture(str(tmp_path / "mine.mp4")).get(cv2.CAP_PROP_FPS) == 12.5
+    error = (back.astype(float) - frames) ** 2
+    assert 10 * np.log10(255**2 / error.mean()) > 37  # dB; measured 39.3, and 29.7 if written unenlarged
+
+
+def test_red_stays_red(tmp_path):
+    frames = film()
+    frames[:, :40] = (200, 30, 60)
+    video.write(tmp_path / "mine.mp4", frames, 25)
+    back, _ = video.read(tmp_path / "mine.mp4")
+    assert np.abs(back[:, 5:35].mean(axis=(0, 1, 2)) - (200, 30, 60)).max() < 6
+
+
+def test_reading_twice_gives_identical_frames(tmp_path):
+    video.write(tmp_path / "mine.mp4", film(), 25)
+    assert np.array_equal(video.read(tmp_path / "mine.mp4")[0], video.read(tmp_path / "mine.mp4")[0])
+
+
+def test_central_square_of_a_wide_video_is_kept(tmp_path):
+    wide = np.zeros((30, 84, 200, 3), np.uint8)
+    wide[:, :, 58:142] = film()
+    encode(tmp_path / "mine.mp4", wide)
+    back, _ = video.read(tmp_path / "mine.mp4")
+    assert np.abs(back.astype(float) - film()).mean() < 10
+
+
+def test_4k_video_is_shrunk_to_what_it_shows(tmp_path):
+    small = film(4)
+    encode(tmp_path / "mine.mp4", [cv2.resize(f, (3840, 2160), interpolation=cv2.INTER_AREA) for f in small])
+    frames, warnings = video.read(tmp_path / "mine.mp4")
+    assert frames.shape == (4, 84, 84, 3) and warnings == []
+
+
+class Film:
+    """Stands in for cv2.VideoCapture: frames made as they are asked for, none kept."""
+
+    def __init__(self, frames):
+        self.frames = iter(frames)
+
+    def isOpened(self):
+        return True
+
+    def grab(self):
+        self.frame = next(self.frames, None)
+        return self.frame is not None
+
+    def retrieve(self):
+        return True, self.frame
+
+    def get(self, _):
+        return 0  # a header that states no length
+
+
+def play(monkeypatch, frames):
+    monkeypatch.setattr(video.cv2, "VideoCapture", lambda *_: Film(frames))
+    return video.read(__file__)  # a file that exists
+
+
+def test_memory_does_not_grow_with_the_length_of_a_4k_video(monkeypatch):
+    one_frame = 2160 * 3840 * 3  # 25 MB
+    frames = (
+        np.full((2160, 3840, 3), 8 * t, np.uint8) * (np.arange(3840) < 2000)[:, None] for t in range(15)
+    )
+    tracemalloc.start()
+    play(monkeypatch, frames)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert one_frame < peak < 5 * one_frame  # all fifteen would be 15
+
+
+def test_long_video_is_thinned_evenly_and_says_so(monkeypatch):
+    monkeypatch.setattr(video, "MAX_FRAMES", 10)
+    seen = itertools.count()
+    bgr = (
+        np.tile(np.uint8(6 * next(seen) * (np.arange(84) < 42)), (84, 1))[..., None].repeat(3, 2)
+        for _ in range(35)
+    )
+    frames, warnings = play(monkeypatch, bgr)
+    assert frames[:, 0, 0, 0].tolist() == [6 * t for t in range(0, 35, 4)]
+    assert "35 frames are many; every 4th is used, 9 in all." in warnings[0]
+
+
+def test_enlarged_film_for_a_report_shows_the_same(tmp_path):
+    video.write(tmp_path / "mine.mp4", film(), 25, scale=4)
+    assert cv2.VideoCapture(str(tmp_path / "mine.mp4")).get(cv2.CAP_PROP_FRAME_WIDTH) == 336
+    assert np.abs(video.read(tmp_path / "mine.mp4")[0].astype(float) - film()).mean() < 5
+
+
+def dies_midway():
+    yield from film()[:10]
+    raise RuntimeError("the simulator died")
+
+
+def test_failure_midway_leaves_no_file(tmp_path):
+    with pytest.raises(RuntimeError, match="the simulator died"):
+        video.write(tmp_path / "mine.mp4", dies_midway(), 25)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_failure_midway_leaves_the_old_file(tmp_path):
+    video.write(tmp_path / "mine.mp4", film(), 25)
+    old = (tmp_path / "mine.mp4").read_bytes()
+    with pytest.raises(RuntimeError):
+        video.write(tmp_path / "mine.mp4", dies_midway(), 25)
+    assert [p.read_bytes() for p in tmp_path.iterdir()] == [old]
+
+
+def test_no_frames_write_no_file(tmp_path):
+    with pytest.raises(InputError, match=r"mine\.mp4: there are no frames to write"):
+        video.write(tmp_path / "mine.mp4", [], 25)
+    assert list(tmp_path.iterdir()) == []
