@@ -18,7 +18,7 @@ import torch
 
 from lbw_minimal import munit, sac, transporter
 from lbw_minimal.reward import KeypointReward
-from lbw_minimal.training import Checkpoint, InputError, write_atomic
+from lbw_minimal.training import Checkpoint, write_atomic
 from lbw_minimal.wrappers import KeypointObservation, KeypointRewardWrapper
 
 
@@ -28,11 +28,11 @@ class Recipe:
 
     human_frames: int  # frames the translation sees: the demonstration and random motion (Table I)
     robot_frames: int  # frames of random robot motion (Table I)
-    munit_iterations: int = 1500
+    munit_iterations: int = 800
     munit_width: int = 20  # channels of the first layer
-    transporter_iterations: int = 1500
+    transporter_iterations: int = 400
     K: int = 5  # keypoints
-    policy_steps: int = 12_000  # environment steps of SAC
+    policy_steps: int = 8_000  # environment steps of SAC
 
 
 @dataclass
@@ -124,7 +124,8 @@ def imitate(env, demo, robot, perception: Perception, recipe: Recipe, *, seed, r
     """
     perception.translated = perception.translate(demo)  # v_1^E .. v_N^E
     perception.z_E = perception.detect(perception.translated)  # z_1^E .. z_N^E, (N, K, 2)
-    reward = KeypointReward(perception.z_E, perception.detect(robot), form=form)
+    horizon = env.spec.max_episode_steps
+    reward = KeypointReward(perception.z_E, perception.detect(robot), form=form, horizon=horizon)
     env = KeypointRewardWrapper(KeypointObservation(env, perception.detect), reward)
     path = run.out / "policy.safetensors"
     if path.exists():

@@ -26,12 +26,13 @@ from lbw_minimal.training import (
     seed_everything,
 )
 
-LAMBDA_IMAGE, LAMBDA_CONTENT, LAMBDA_STYLE = 10.0, 1.0, 1.0  # Eq. 5; MUNIT's own values
-LAMBDA_CYCLE = 10.0  # not in the paper: MUNIT's authors add it where pixels must stay aligned, as here
+LAMBDA_IMAGE, LAMBDA_CONTENT, LAMBDA_STYLE = 5.0, 0.5, 0.5  # Eq. 5; half of MUNIT's, or the arm stays blurred
+LAMBDA_CYCLE = 5.0  # not in the paper: MUNIT's authors add it where pixels must stay aligned, as here
 # Not in the paper: weights of what differs from the median frame, see `motion_weight`.
 MOTION_L1 = 4.0  # with 0 the L1 losses forget the object, which covers 1 % of the picture
 MOTION_GAN = 20.0  # with 0 four fifths of the patches are wall, and the critics hardly look at the arm
-LEARNING_RATE = 4e-4  # of both Adams, down to 0 over the second half
+# Of the two Adams, down to 0 over the second half. Critics as slow as the generators leave the arm blurred.
+LEARNING_RATE, CRITIC_RATE = 4e-4, 1.2e-3
 AVERAGE = 0.995  # decay a step of the averaged weights, which flicker less from frame to frame
 LOG_EVERY = 50  # steps
 
@@ -140,7 +141,7 @@ class Critic(nn.Module):
 
 
 def motion_weight(image: torch.Tensor, median: torch.Tensor | None, gain: float) -> torch.Tensor:
-    """1 + gain * distance of image (B, 3, H, W) from the median frame (1, 3, H, W) of its domain: (B, 1, H, W).
+    """1 + gain * distance of image (B, 3, H, W) from its domain's median frame (1, 3, H, W): (B, 1, H, W).
 
     Not in the paper; without a median it is 1 everywhere, which is the paper.
     """
@@ -172,7 +173,7 @@ def swap(model: MUNIT, x: torch.Tensor, y: torch.Tensor) -> tuple[torch.Tensor, 
 def generator_losses(model, critics, x, y, swapped, median_x=None, median_y=None) -> dict[str, torch.Tensor]:
     """The encoders' and generators' side of Eq. 1 to 4 by the paper's names, and the cycle loss L_cyc.
 
-    x, y (B, 3, 84, 84) in [-1, 1], `swapped` from `swap`; medians (1, 3, 84, 84) switch the motion weights on.
+    x, y (B, 3, 84, 84) in [-1, 1], `swapped` from `swap`; medians (1, 3, 84, 84) switch motion weights on.
     """
     c_x, c_y, s_x, s_y, x_of_y, y_of_x = swapped
     c_x_again, c_y_again = model.content(y_of_x, "y"), model.content(x_of_y, "x")
@@ -207,19 +208,21 @@ def total_loss(L: dict[str, torch.Tensor]) -> torch.Tensor:
 
 def discriminator_losses(critics, x, y, swapped, median_x=None, median_y=None) -> dict[str, torch.Tensor]:
     """The critics' side of Eq. 1 in least squares: real x and y to 1, the translations in `swapped` to 0."""
-    losses = {}
-    for domain, real, made, median in (("x", x, swapped[4], median_x), ("y", y, swapped[5], median_y)):
-        made = made.detach()
-        losses[f"L_D^{domain}"] = _least_squares(
-            critics[domain](real), 1.0, motion_weight(real, median, MOTION_GAN)
-        ) + _least_squares(critics[domain](made), 0.0, motion_weight(made, median, MOTION_GAN))
-    return losses
+
+    def loss(D, real, made, median):
+        w_real, w_made = motion_weight(real, median, MOTION_GAN), motion_weight(made, median, MOTION_GAN)
+        return _least_squares(D(real), 1.0, w_real) + _least_squares(D(made), 0.0, w_made)  # Eq. 1
+
+    x_of_y, y_of_x = swapped[4].detach(), swapped[5].detach()
+    return {
+        "L_D^x": loss(critics["x"], x, x_of_y, median_x),
+        "L_D^y": loss(critics["y"], y, y_of_x, median_y),
+    }
 
 
 def to_images(frames: np.ndarray, device: torch.device | str = "cpu") -> torch.Tensor:
     """Frames (B, H, W, 3) uint8 as images (B, 3, H, W) in [-1, 1]."""
-    # Permuted, not copied: this is torch's channels_last, in which the convolutions take 2/3 of the time.
-    return torch.from_numpy(frames).to(device).permute(0, 3, 1, 2).float() / 127.5 - 1
+    return torch.tensor(frames, device=device).permute(0, 3, 1, 2).contiguous().float() / 127.5 - 1
 
 
 def to_frames(images: torch.Tensor) -> np.ndarray:
@@ -261,10 +264,11 @@ def train(
     checkpoint = checkpoint or Checkpoint(None)
     rng = seed_everything(seed)
     device = pick_device(device)
-    model = MUNIT(width).to(device, memory_format=torch.channels_last)
-    critics = nn.ModuleDict({d: Critic() for d in "xy"}).to(device, memory_format=torch.channels_last)
+    model = MUNIT(width).to(device)
+    critics = nn.ModuleDict({domain: Critic() for domain in "xy"}).to(device)
     average = copy.deepcopy(model)
-    adam_G, adam_D = (torch.optim.Adam(m.parameters(), betas=(0.5, 0.999)) for m in (model, critics))
+    adam_G = torch.optim.Adam(model.parameters(), LEARNING_RATE, betas=(0.5, 0.999))
+    adam_D = torch.optim.Adam(critics.parameters(), CRITIC_RATE, betas=(0.5, 0.999))
     median_x, median_y = _median(human, device), _median(robot, device)
     stateful = dict(model=model, critics=critics, average=average, adam_G=adam_G, adam_D=adam_D)
 
@@ -281,8 +285,8 @@ def train(
 
     bar = progress(iterations, "MUNIT", step)
     while step < iterations:
-        for group in adam_G.param_groups + adam_D.param_groups:
-            group["lr"] = LEARNING_RATE * min(1.0, 2 * (1 - step / iterations))
+        for adam, rate in ((adam_G, LEARNING_RATE), (adam_D, CRITIC_RATE)):
+            adam.param_groups[0]["lr"] = rate * min(1.0, 2 * (1 - step / iterations))
         x, y = _draw(human, batch, rng, device), _draw(robot, batch, rng, device)
 
         critics.requires_grad_(False)  # the generators' step learns through the critics, not in them
@@ -294,7 +298,7 @@ def train(
         adam_G.step()
 
         critics.requires_grad_(True)
-        with _bfloat16(device):  # on the translations made above: making new ones costs a fifth more
+        with _bfloat16(device):  # on the translations made above: new ones would cost an eighth more
             L_D = discriminator_losses(critics, x, y, swapped, median_x, median_y)
         adam_D.zero_grad()
         sum(L_D.values()).backward()
@@ -309,7 +313,9 @@ def train(
             sums[name] = sums.get(name, 0.0) + loss.item()
         if step % LOG_EVERY == 0:
             log.append({"step": step} | {name: value / LOG_EVERY for name, value in sums.items()})
-            log[-1] |= _mean_image_errors(mean_images(average, human, robot))
+            mean = mean_images(average, human, robot)
+            log[-1]["mean_image^x"] = float(np.abs(mean["x_of_y"] - mean["x"]).mean())
+            log[-1]["mean_image^y"] = float(np.abs(mean["y_of_x"] - mean["y"]).mean())
             sums = {}
             bar.set_postfix_str(f"cycle {log[-1]['L_cyc^y']:.3f}")
         bar.update()
@@ -356,23 +362,21 @@ def mean_images(model: MUNIT, human: np.ndarray, robot: np.ndarray) -> dict[str,
     return {k: f.mean(0) for k, f in (("x", human), ("x_of_y", x_of_y), ("y", robot), ("y_of_x", y_of_x))}
 
 
-def _mean_image_errors(mean):
-    return {
-        "mean_image^x": float(np.abs(mean["x_of_y"] - mean["x"]).mean()),
-        "mean_image^y": float(np.abs(mean["y_of_x"] - mean["y"]).mean()),
-    }
+def save(path: Path | str, model: MUNIT, style: torch.Tensor, task: str) -> None:
+    """Write the model with its sizes, the robot style (style_dim,) to translate with, and its task."""
+    what = {"kind": "munit", "task": task, "sizes": model.sizes}
+    save_state(path, what | {"model": model.state_dict(), "style": style})
 
 
-def save(path: Path | str, model: MUNIT, task: str) -> None:
-    """Write the model with its sizes and the name of the task it was trained on."""
-    save_state(path, {"kind": "munit", "task": task, "sizes": model.sizes, "model": model.state_dict()})
-
-
-def load(path: Path | str) -> tuple[MUNIT, str]:
-    """The model that `save` wrote and its task. Raises InputError if the file holds something else."""
-    state = load_state(path)
-    if state.get("kind") != "munit":
+def load(path: Path | str, task: str) -> tuple[MUNIT, torch.Tensor]:
+    """Model and style that `save` wrote. Raises InputError if it holds another thing or another task."""
+    saved = load_state(path)
+    if saved.get("kind") != "munit":
         raise InputError(f"{path}: not the weights of a MUNIT; give the file that its training wrote.")
-    model = MUNIT(**state["sizes"])
-    model.load_state_dict(state["model"])
-    return model.to(memory_format=torch.channels_last).eval(), state["task"]
+    if saved["task"] != task:
+        raise InputError(
+            f"{path}: weights of the task {saved['task']}, not of {task}; give those or train anew."
+        )
+    model = MUNIT(**saved["sizes"])
+    model.load_state_dict(saved["model"])
+    return model.eval(), saved["style"]

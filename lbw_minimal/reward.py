@@ -1,108 +1,164 @@
-"""The keypoint reward, Eq. 8-10: how near is the robot to the translated demonstration?
+"""The keypoint reward, Eq. 8-10: how well does the robot follow the translated demonstration?
 
-In: the demonstration's keypoint trajectory z^E (N, K, 2), and for the mended form the keypoints of the
-robot's random video (M, K, 2). Out: r_t for a transition z_t -> z_{t+1}, with its parts r1 and r2.
-`form="literal"` is the paper's. Under it an arm that idles scores as well as the demonstration if that
-starts at rest or pauses: r1 = 0, r2 = 0. `form="mended"` adds what makes it learn; every line of it
-that is not in the paper says so, and every mend can be switched off alone.
+In: the demonstration's keypoint trajectory z^E (N, K, 2); for the mended form also the keypoints of the
+robot's random video (M, K, 2). Out: r_t of a transition z_t -> z_{t+1}, with its parts r1 and r2.
+`form="literal"` is the paper's. It pays an idle arm as much as the demonstration whenever that starts
+at rest or pauses: r1 = 0 and r2 = 0, for ever. `form="mended"` is what learns; none of its mends is in
+the paper, and each can be switched off alone.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from .training import InputError
+
+LEAST_STEP = 0.25  # of the robot's step: what moves less from frame to frame is a pause
+MOST_OF_HORIZON = 0.7  # the demonstration's share of an episode, so that time is left to reach its goal
+STILL = 0.1  # of the widest keypoint's extent: a keypoint that moves less takes no part in the skill
+
+
+def _steps(z):
+    return np.linalg.norm(z[1:] - z[:-1], axis=-1)  # (T - 1, K)
+
+
+def _median_step(z):
+    return float(np.median(np.linalg.norm(_steps(z), axis=1)))
+
 
 def keypoint_noise(video: np.ndarray) -> np.ndarray:
-    """Standard deviation (K,) of a still keypoint's jitter, from second differences of z (M, K, 2).
+    """Jitter (K,) of each coordinate, one standard deviation, from second differences of z (M, K, 2).
 
-    A median, because smooth motion has small second differences and resets are rare.
+    Smooth motion all but cancels in them, and the median passes over resets and lost keypoints.
     """
-    jerk = np.abs(z_diff(z_diff(video)))  # (M - 2, K, 2)
-    return 1.4826 * np.median(jerk, axis=(0, 2)) / 6**0.5  # var(a - 2b + c) = 6 var
+    bend = video[2:] - 2 * video[1:-1] + video[:-2]  # variance 1 + 4 + 1 = 6 times the jitter's
+    return 1.4826 * np.median(np.abs(bend), axis=(0, 2)) / np.sqrt(6)
 
 
-def z_diff(z):
-    return z[1:] - z[:-1]
-
-
-def step_length(z: np.ndarray) -> float:
-    """Median norm of z_{t+1} - z_t over (T, K, 2)."""
-    return float(np.median(np.linalg.norm(z_diff(z).reshape(len(z) - 1, -1), axis=1)))
-
-
-def trim(z: np.ndarray, least: float) -> np.ndarray:
-    """Drop the frames less than `least` away from the last one kept: pauses go, the goal stays."""
+def trim_pauses(z: np.ndarray, least: float) -> np.ndarray:
+    """Drop frames of z (N, K, 2) nearer than `least` to the last one kept; first and last frame stay."""
     kept = [0]
-    for i in range(1, len(z)):
+    for i in range(1, len(z) - 1):
         if np.linalg.norm(z[i] - z[kept[-1]]) >= least:
             kept.append(i)
-    if kept[-1] != len(z) - 1:
-        kept[-1 if len(kept) > 1 else len(kept):] = [len(z) - 1]
-    return z[kept]
+    return z[[*kept, len(z) - 1]]
 
 
 def resample(z: np.ndarray, step: float, longest: int) -> np.ndarray:
-    """Stretch time by one factor so that the median step is `step`, in at most `longest` frames."""
-    n = round((len(z) - 1) * step_length(z) / step) + 1
-    n = int(np.clip(n, 2, longest))
+    """Stretch the time of z (N, K, 2) by one factor that makes its median step `step`.
+
+    One factor, not one speed: a strike stays faster than the approach to it. The result has at most
+    `longest` frames.
+    """
+    n = int(np.clip(round((len(z) - 1) * _median_step(z) / step) + 1, 2, longest))
     t = np.linspace(0, len(z) - 1, n)
     i = np.minimum(t.astype(int), len(z) - 2)
-    return z[i] + (t - i)[:, None, None] * (z[i + 1] - z[i])
+    return z[i] + (t - i)[:, None, None] * (z[i + 1] - z[i])  # (n, K, 2)
+
+
+def prepare(z, robot, *, horizon=None, trim=True, speed=True) -> np.ndarray:
+    """The demonstration (N, K, 2) as the robot could do it: no glitches, no pauses, the robot's pace.
+
+    robot (M, K, 2): its random video, whose median step is the pace. Arguments as `KeypointReward`.
+    """
+    z, step = np.asarray(z, np.float64), _median_step(robot)
+    z = np.concatenate([z[:1], np.median([z[:-2], z[1:-1], z[2:]], axis=0), z[-1:]])  # one lost frame
+    z = trim_pauses(z, LEAST_STEP * step) if trim else z
+    return resample(z, step, int(MOST_OF_HORIZON * horizon) if horizon else len(z) * 10) if speed else z
+
+
+def keypoint_weights(z: np.ndarray, robot: np.ndarray) -> np.ndarray:
+    """How much each keypoint of the demonstration z (N, K, 2) counts: (K,), of sum 1.
+
+    What random motion (M, K, 2) seldom moves is what the skill is about: a pushed object has one
+    keypoint, the arm has four. The root keeps the arm's lead to the object; jitter sets a floor. A
+    keypoint that hardly moves in the demonstration counts nothing: it would add jitter alone.
+    """
+    step, noise = _steps(robot), keypoint_noise(robot)
+    typical = np.minimum(step, _median_step(robot)).mean(0)  # the minimum takes out resets
+    extent = np.linalg.norm(z - z[0], axis=-1).max(0)
+    w = (extent > np.maximum(STILL * extent.max(), 6 * noise)) / np.sqrt(np.maximum(typical, noise) + 1e-6)
+    return w / w.sum() if w.any() else np.full(len(w), 1 / len(w))
 
 
 class KeypointReward:
-    def __init__(self, trajectory, robot=None, *, longest=10**6, form="mended", trim=True, resample=True, include_goal=True, weights=True, timed=True, lam2=1.0, power=1.0):
-        z = np.asarray(trajectory, np.float64)
-        N, K = z.shape[:2]
-        self.form = form
-        if form == "literal":
-            self.z_E, self.timed, self.include_goal = z, False, False
-            self.w, self.R, self.lam = None, 1, (1, 1)
-            return
-        noise = keypoint_noise(robot)
-        step = step_length(robot)
-        z = np.median([z[:-2], z[1:-1], z[2:]], axis=0) if len(z) > 4 else z
-        if trim:
-            z = globals()["trim"](z, 0.25 * step)
-        if resample:
-            z = globals()["resample"](z, step, longest)
-        self.z_E = z
-        extent = np.linalg.norm(z - z[0], axis=-1).max(0)
-        if weights:
-            moved = extent > np.maximum(6 * noise, 0.1 * extent.max())
-            mean_step = np.linalg.norm(z_diff(robot), axis=-1).mean(0)
-            self.w = moved / np.maximum(mean_step, noise)**power
-            self.w /= self.w.sum()
-        else:
-            self.w = np.full(K, 1 / K)
-        self.R = (self.w * extent).sum()
-        self.timed, self.include_goal = timed, include_goal
-        self.lam = (1.0, lam2)
+    """r_t = lambda_r1 r1(t) + lambda_r2 r2(t), Eq. 8. A pure function of z_t, z_{t+1} and, if `timed`, t.
 
-    @property
-    def N(self):
+    trajectory: z^E (N, K, 2) in [-1, 1], N >= 3. robot: keypoints (M, K, 2) of the robot's random
+    video, which the mended form needs for the robot's pace and the jitter. horizon: steps of an
+    episode; the prepared demonstration takes at most 70 % of it. lam: (lambda_r1, lambda_r2).
+
+    The mends: `trim` cuts pauses, which make idling look like the skill; `speed` brings the
+    demonstration to the robot's pace; `include_goal` lets p reach N; `weights` weighs keypoints (off:
+    all alike); `timed` takes p = q = t instead of the nearest frame, so that falling behind costs.
+    The mended reward also judges z_{t+1}, which a_t can still change, where Eq. 9 judges z_t, and adds
+    up lengths per keypoint, each capped at twice the path: a lost keypoint costs a bounded share.
+    Its unit: r1 = -1 is an arm that never moved, seen at the end. It lies in [-2 sum(lam), 0].
+
+    Raises InputError where shapes do not fit or nothing moves in the demonstration.
+    """
+
+    def __init__(
+        self,
+        trajectory,
+        robot=None,
+        *,
+        form: str = "mended",
+        horizon: int | None = None,
+        lam: tuple[float, float] = (1.0, 1.0),
+        trim: bool = True,
+        speed: bool = True,
+        include_goal: bool = True,
+        weights: bool = True,
+        timed: bool = True,
+    ):
+        z = np.asarray(trajectory, np.float64)
+        if z.ndim != 3 or z.shape[2] != 2 or len(z) < 3:
+            raise InputError(f"keypoint trajectory of shape {z.shape}: give (N, K, 2) with N of 3 or more.")
+        if form not in ("literal", "mended"):
+            raise InputError(f"reward form {form!r}: choose 'literal' or 'mended'.")
+        self.literal, self.lam = form == "literal", lam
+        self.timed = timed and not self.literal
+        if not self.literal:
+            robot = np.asarray(robot, np.float64)
+            if robot.ndim != 3 or robot.shape[1:] != z.shape[1:] or len(robot) < 3:
+                raise InputError(
+                    f"robot keypoints of shape {robot.shape}: give (M, {z.shape[1]}, 2), M >= 3."
+                )
+            z = prepare(z, robot, horizon=horizon, trim=trim, speed=speed)
+            self.w = keypoint_weights(z, robot) if weights else np.full(z.shape[1], 1 / z.shape[1])
+            self.path = self.w @ np.linalg.norm(z - z[0], axis=-1).max(0)
+            if self.path < 1e-6:
+                raise InputError("nothing moves in the demonstration; give a video that shows the skill.")
+        self.z_E = z  # (N, K, 2)
+        self.v_E = z[1:] - z[:-1]  # (N - 1, K, 2)
+        self.last = len(z) - 1 if include_goal and not self.literal else len(z) - 2
+
+    def __len__(self):
         return len(self.z_E)
 
-    def clock(self, t):
-        return min(t, self.N - 1) / (self.N - 1)
+    def _distance(self, d):
+        """Norm of the differences d (..., K, 2) over all keypoints: (...)."""
+        if self.literal:
+            return np.sqrt(np.square(d).sum((-2, -1)))
+        return np.minimum(np.linalg.norm(d, axis=-1), 2 * self.path) @ self.w / self.path
 
-    def _norm(self, d):
-        if self.form == "literal":
-            return np.sqrt((d**2).sum((-2, -1)))
-        return (self.w * np.minimum(np.linalg.norm(d, axis=-1), 2 * self.R)).sum(-1) / self.R
-
-    def __call__(self, z, z_next, t=None):
-        last = self.N - 1 if self.include_goal else self.N - 2
-        v_E = z_diff(self.z_E)
-        if self.form == "literal":
-            r1 = -self._norm(z - self.z_E[:-1]).min()
-            r2 = -self._norm(z_next - z - v_E).min()
-        elif self.timed:
-            i = min(t + 1, last)
-            r1 = -self._norm(z_next - self.z_E[i])
-            v = self.z_E[i] - self.z_E[min(t, last)]
-            r2 = -self._norm(z_next - z - v)
+    def __call__(self, z, z_next, t: int = 0) -> tuple[float, dict[str, float]]:
+        """r_t and its parts {"r1", "r2"} of z_t, z_{t+1} (K, 2) at step t = 0, 1, ... of the episode."""
+        if self.timed:
+            z_p, i = self.target(t), min(t, self.last)
+            v_q = z_p - self.z_E[i]  # 0 once the goal is reached: stay there
         else:
-            r1 = -self._norm(z_next - self.z_E[: last + 1]).min()
-            r2 = -self._norm(z_next - z - v_E).min()
-        return self.lam[0] * r1 + self.lam[1] * r2, {"r1": r1, "r2": r2}
+            z_p, v_q = self.z_E[: self.last + 1], self.v_E  # all p, all q
+        r1 = -self._distance((z if self.literal else z_next) - z_p).min()  # Eq. 9
+        r2 = -self._distance(z_next - z - v_q).min()  # Eq. 10
+        r = self.lam[0] * r1 + self.lam[1] * r2  # Eq. 8
+        return float(r), {"r1": float(r1), "r2": float(r2)}
+
+    def target(self, t: int) -> np.ndarray:
+        """z^E (K, 2) where the demonstration is after step t; its end stays."""
+        return self.z_E[min(t + 1, self.last)]
+
+    def clock(self, t: int) -> float:
+        """How far the demonstration is at step t, 0 to 1; all that a timed reward's future hangs on."""
+        return min(t, self.last) / self.last

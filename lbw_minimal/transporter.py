@@ -1,9 +1,9 @@
-"""Transporter (Sec. III-B): keypoints of a video without labels, from what has to move between two frames.
+"""Transporter (Sec. III-B of the paper): keypoints without labels, from what moves between two frames.
 
 Eq. 6 rebuilds frame y from the features of frame x, cut out and pasted at K points; Eq. 7 compares.
-Only what sits under a keypoint can change place, so the K points settle on what moves: arm and object.
+Only what stands under a keypoint can change its place, so the points settle on arm and object.
 In: videos (T, 84, 84, 3) uint8 of the robot and of the translated human. Out: keypoints z (T, K, 2)
-in [-1, 1], x right and y down. `(z + 1) * 42 - 0.5` is the pixel.
+in [-1, 1], x right and y down; (z + 1) * 42 - 0.5 is the pixel.
 """
 
 from __future__ import annotations
@@ -15,17 +15,28 @@ import torch
 import torch.nn.functional as F
 from torch import nn
 
-from lbw_minimal.training import Checkpoint, InputError, load_state, pick_device, progress, save_state, seed_everything
+from lbw_minimal.training import (
+    Checkpoint,
+    InputError,
+    load_state,
+    pick_device,
+    progress,
+    save_state,
+    seed_everything,
+)
 
 SIGMA = 0.1  # width of a keypoint's Gaussian in units of z: one cell of the 21 x 21 map
-GAIN = 10.0  # marginal means are small; without a gain the soft-argmax starts, and stays, at the centre
-GAP = 20  # frames; a pair further apart shares little but the background
-ACROSS = 0.2  # share of pairs whose frames are drawn freely from two videos
-MOTION = 10.0  # weight of what differs from the median frame; at 0 a small object gets no keypoint
+SIGMA_START = 0.3  # a keypoint must first feel the object from afar: at 0.1 the arm takes all of them
+GAIN = 10.0  # marginal means are small; without a gain the soft-argmax starts, and stays, near the centre
+GAP = 20  # frames between the two of a pair; further apart is as good as drawn freely
+ACROSS = 0.5  # share of pairs drawn freely: within GAP frames the object has moved in only 4 of 10 pairs
+MOTION = 10.0  # weight of what differs from the median frame, see `motion_weight`
+LEARNING_RATE = 2e-3  # falls to 0 along a cosine
+BATCH = 32
 
 
 def _block(c_in, c_out, kernel, stride):
-    # Even kernels at stride 2 keep cell i centred on pixel 4i + 1.5. A group of one channel is instance norm.
+    # Even kernels at stride 2 keep cell i centred on pixel 4i + 1.5. Groups of one channel are instance norm.
     conv = nn.Conv2d(c_in, c_out, kernel, stride, (kernel - 1) // 2, bias=False)
     return nn.Sequential(conv, nn.GroupNorm(c_out, c_out), nn.ReLU(inplace=True))
 
@@ -39,32 +50,45 @@ def _encoder():
 
 
 def _cells(n, like):
-    return (2 * torch.arange(n, dtype=like.dtype, device=like.device) + 1) / n - 1  # centres of n cells in [-1, 1]
+    # The centres of n cells that fill [-1, 1]: z = -1 and 1 are the edges of the frame.
+    return (2 * torch.arange(n, dtype=like.dtype, device=like.device) + 1) / n - 1  # (n,)
 
 
 def soft_argmax(logits: torch.Tensor) -> torch.Tensor:
-    """Keypoints (B, K, 2) of logits (B, K, h, w): the mean position under the softmax of each marginal mean."""
+    """Keypoints (B, K, 2) of logits (B, K, h, w): mean position under the softmax of each marginal mean."""
     x = (GAIN * logits.mean(2)).softmax(-1) @ _cells(logits.shape[3], logits)  # (B, K)
     y = (GAIN * logits.mean(3)).softmax(-1) @ _cells(logits.shape[2], logits)
     return torch.stack([x, y], -1)
 
 
-def heat_map(z: torch.Tensor, size: int = 21, sigma: float = SIGMA) -> torch.Tensor:
-    """H (B, 1, size, size) in [0, 1] of keypoints z (B, K, 2): H = 1 - prod_k (1 - h_k), h = exp(-d^2 / sigma^2)."""
-    cells = _cells(size, z)
-    g = torch.exp(-(((cells - z[..., None]) / sigma) ** 2))  # (B, K, 2, size), the two factors of each h_k
+def heat_map(z: torch.Tensor, sigma: float = SIGMA, size: int = 21) -> torch.Tensor:
+    """H (B, 1, size, size) in [0, 1] of keypoints z (B, K, 2), each a Gaussian exp(-d^2 / sigma^2)."""
+    g = torch.exp(-(((_cells(size, z) - z[..., None]) / sigma) ** 2))  # (B, K, 2, size)
     h = g[:, :, 1, :, None] * g[:, :, 0, None, :]  # (B, K, size, size)
     return 1 - (1 - h).prod(1, keepdim=True)  # a sum would exceed 1 where keypoints meet
 
 
 def transport(phi_x: torch.Tensor, phi_y: torch.Tensor, h_x: torch.Tensor, h_y: torch.Tensor) -> torch.Tensor:
-    """Eq. 6: features of x without what stood at either frame's keypoints, and with y's at y's.
+    """Eq. 6: the features of x without what stands at either frame's keypoints, and with y's at y's.
 
-    phi (B, C, h, w), h (B, 1, h, w) in [0, 1]. As in Kulkarni et al. (2019) nothing is learnt through
-    the source x: else the features of x could carry y's picture by themselves.
+    phi (B, C, h, w), h (B, 1, h, w) in [0, 1]. Nothing is learnt through the source x, as in
+    Kulkarni et al. (2019).
     """
     phi_x, h_x = phi_x.detach(), h_x.detach()
     return (1 - h_x) * (1 - h_y) * phi_x + h_y * phi_y
+
+
+def motion_weight(y: torch.Tensor, median: torch.Tensor) -> torch.Tensor:
+    """Weight (B, 1, H, W) >= 1 of each pixel of y (B, 3, H, W): 1 + MOTION * distance from the median frame.
+
+    Not in the paper. A small object is 1 % of the frame; unweighted, the loss can do without it.
+    """
+    return 1 + MOTION * (y - median).abs().mean(1, keepdim=True)
+
+
+def loss(y_hat: torch.Tensor, y: torch.Tensor, weight: torch.Tensor | float = 1.0) -> torch.Tensor:
+    """Eq. 7, squared as in Kulkarni et al. (2019): a missing object costs more than a blurred edge."""
+    return (weight * (y_hat - y) ** 2).mean()
 
 
 class Transporter(nn.Module):
@@ -74,7 +98,7 @@ class Transporter(nn.Module):
         super().__init__()
         self.K = K
         self.phi = _encoder()
-        self.psi = nn.Sequential(_encoder(), nn.Conv2d(32, K, 1))
+        self.psi = nn.Sequential(_encoder(), nn.Conv2d(32, K, 1))  # (B, K, 21, 21)
         self.refiner = nn.Sequential(
             _block(32, 32, 3, 1),
             nn.Upsample(scale_factor=2),
@@ -86,9 +110,149 @@ class Transporter(nn.Module):
         """z (B, K, 2) in [-1, 1], x right and y down, of images (B, 3, 84, 84) in [-1, 1]."""
         return soft_argmax(self.psi(images))
 
-    def forward(self, x, y, y_seen=None):
-        """y rebuilt from x by Eq. 6, (B, 3, 84, 84), and y's keypoints (B, K, 2)."""
-        with torch.no_grad():
-            phi_x, z_x = self.phi(x), self.keypoints(x)
-        z_y = self.keypoints(y if y_seen is None else y_seen)
-        return self.refiner(transport(phi_x, self.phi(y), heat_map(z_x), heat_map(z_y))), z_y
+    def forward(self, x, y, y_seen=None, sigma: float = SIGMA):
+        """y rebuilt from x, (B, 3, 84, 84); `y_seen` is what the detector sees of y, by default y itself."""
+        with torch.no_grad():  # `transport` would stop the gradient anyway; this also saves its cost
+            phi_x, h_x = self.phi(x), heat_map(self.keypoints(x), sigma)
+        h_y = heat_map(self.keypoints(y if y_seen is None else y_seen), sigma)
+        return self.refiner(transport(phi_x, self.phi(y), h_x, h_y))
+
+
+def _to_network(frames):
+    return frames.permute(0, 3, 1, 2).contiguous().float() / 127.5 - 1  # (B, 3, 84, 84) in [-1, 1]
+
+
+def _augment(y):
+    """y as a poor camera or an imperfect translation would show it; nothing moves, z must not change.
+
+    Drawn on the CPU, whose random state is in the checkpoint.
+    """
+    b = len(y)
+    gain, bias = 1 + 0.15 * torch.randn(b, 3, 1, 1), 0.1 * torch.randn(b, 3, 1, 1)
+    noise = 0.1 * torch.rand(b, 1, 1, 1) * torch.randn(y.shape)
+    blurred = torch.rand(b, 1, 1, 1).to(y.device) < 0.5
+    seen = y * gain.to(y.device) + (bias + noise).to(y.device)
+    return torch.where(blurred, F.avg_pool2d(seen, 3, 1, 1), seen)
+
+
+def _draw_pairs(lengths, n, rng):
+    """Indices (n,), (n,) of source and target into the joined videos; every video is target equally often."""
+    ends = np.cumsum(lengths)
+    starts = ends - lengths
+    video = rng.integers(len(lengths), size=n)
+    y = rng.integers(starts[video], ends[video])
+    x = np.clip(y + rng.integers(-GAP, GAP + 1, n), starts[video], ends[video] - 1)
+    return np.where(rng.random(n) < ACROSS, rng.integers(ends[-1], size=n), x), y
+
+
+def train(
+    videos: list[np.ndarray],
+    *,
+    iterations: int,
+    seed: int,
+    K: int = 5,
+    device: str = "cpu",
+    checkpoint: Checkpoint | None = None,
+) -> tuple[Transporter, list[dict]]:
+    """Fit a Transporter on videos (T, 84, 84, 3) uint8: the translated ones and the robot's.
+
+    With robot frames as targets too, as here, the detector learns on what it later runs on; the paper
+    names only translated targets. Returns the model and a log: step, loss, and each keypoint's standard
+    deviation (near 0: glued to the background). Raises InputError for frames of another shape or type.
+    """
+    for i, v in enumerate(videos):
+        if v.ndim != 4 or v.shape[1:] != (84, 84, 3) or v.dtype != np.uint8 or len(v) < 2:
+            raise InputError(
+                f"video {i} is {v.shape} {v.dtype}; give two or more frames, (T, 84, 84, 3) uint8."
+            )
+    checkpoint = checkpoint or Checkpoint(None)
+    device, rng = pick_device(device), seed_everything(seed)
+    lengths = np.array([len(v) for v in videos])
+    few = np.concatenate([v[:: len(v) // 200 + 1] for v in videos])  # 200 of each show the background
+    median = _to_network(torch.from_numpy(np.median(few, 0)[None])).to(device)  # (1, 3, 84, 84)
+    frames = torch.from_numpy(np.concatenate(videos)).to(device)
+    model, log, step = Transporter(K).to(device).train(), [], 0
+    optimizer = torch.optim.Adam(model.parameters(), betas=(0.9, 0.99))
+    if saved := checkpoint.load():
+        model.load_state_dict(saved["model"])
+        optimizer.load_state_dict(saved["optimizer"])
+        rng.bit_generator.state = saved["rng"]
+        log, step = saved["log"], saved["step"]
+
+    def state():
+        trained = {"model": model.state_dict(), "optimizer": optimizer.state_dict()}
+        return trained | {"rng": rng.bit_generator.state, "log": log, "step": step}
+
+    bar = progress(iterations, "Transporter", step)
+    while step < iterations:
+        done = step / iterations
+        sigma = SIGMA + (SIGMA_START - SIGMA) * max(0.0, 1 - 2 * done)
+        warm_up = min(1.0, (step + 1) / 20)
+        optimizer.param_groups[0]["lr"] = LEARNING_RATE * warm_up * (1 + np.cos(np.pi * done)) / 2
+        i_x, i_y = (torch.from_numpy(i).to(device) for i in _draw_pairs(lengths, BATCH, rng))
+        x, y = _to_network(frames[i_x]), _to_network(frames[i_y])
+        error = loss(model(x, y, _augment(y), sigma), y, motion_weight(y, median))
+        optimizer.zero_grad()
+        error.backward()
+        nn.utils.clip_grad_norm_(model.parameters(), 1.0)
+        optimizer.step()
+        step += 1
+        bar.update()
+        if step % 50 == 0 or step == iterations:
+            with torch.no_grad():
+                spread = model.keypoints(y).std(0).mean(-1)  # (K,)
+            log.append({"step": step, "loss": error.item(), "keypoint_std": spread.tolist()})
+        checkpoint.save(state, force=step == iterations)
+    bar.close()
+    return model.eval(), log
+
+
+@torch.inference_mode()
+def detect(model: Transporter, frames: np.ndarray) -> np.ndarray:
+    """Keypoints z (T, K, 2) float32 in [-1, 1], x right and y down, of frames (T, 84, 84, 3) uint8."""
+    device = next(model.parameters()).device
+    batches = torch.tensor(frames).split(64)
+    return np.concatenate([model.keypoints(_to_network(b.to(device))).cpu().numpy() for b in batches])
+
+
+def _probe(z, true_px, z_held, true_held):
+    """True and predicted pixels of a least-squares map with intercept, on frames it was not fitted on."""
+    if z_held is None:
+        # The last quarter: neighbouring frames are near copies, so a random split would leak.
+        n = 3 * len(z) // 4
+        z, z_held, true_px, true_held = z[:n], z[n:], true_px[:n], true_px[n:]
+    a, a_held = (np.column_stack([v.reshape(len(v), -1), np.ones(len(v))]) for v in (z, z_held))
+    return true_held, a_held @ np.linalg.lstsq(a, true_px, rcond=None)[0]
+
+
+def r2(z, true_px, z_held=None, true_held=None) -> np.ndarray:
+    """R^2 (D,) <= 1 of the best linear map from z (T, K, 2) to true_px (T, D), scored on held-out frames.
+
+    Without a held-out set the last quarter is held out. A column that hardly moves has no meaningful R^2
+    (an object's height on a table): read its `pixel_error`.
+    """
+    true, predicted = _probe(z, true_px, z_held, true_held)
+    return 1 - ((true - predicted) ** 2).sum(0) / np.maximum(((true - true.mean(0)) ** 2).sum(0), 1e-9)
+
+
+def pixel_error(z, true_px, z_held=None, true_held=None) -> np.ndarray:
+    """Root mean square error (D,) in pixels of the map of `r2`."""
+    true, predicted = _probe(z, true_px, z_held, true_held)
+    return np.sqrt(((true - predicted) ** 2).mean(0))
+
+
+def save(path: Path | str, model: Transporter, task: str) -> None:
+    """Write the detector of `task` with its sizes, atomically."""
+    save_state(path, {"kind": "transporter", "task": task, "K": model.K, "model": model.state_dict()})
+
+
+def load(path: Path | str, task: str | None = None) -> Transporter:
+    """The model in a file, on the CPU. Raises InputError if the file holds another thing or another task."""
+    saved = load_state(path)
+    if saved.get("kind") != "transporter":
+        raise InputError(f"{path}: not the weights of a Transporter; give the file that its training wrote.")
+    if task is not None and saved["task"] != task:
+        raise InputError(f"{path}: weights of the task {saved['task']}, not of {task}; give those of {task}.")
+    model = Transporter(saved["K"])
+    model.load_state_dict(saved["model"])
+    return model.eval()

@@ -1,7 +1,8 @@
 """Two Gymnasium wrappers that turn an environment of images into the paper's, for any agent.
 
-`KeypointObservation`: RGB frame O_t -> keypoints z_t = Psi(O_t). `KeypointReward`: the environment's own
-reward is dropped for r_t of Eq. 8. What the agent sees and earns is a function of frames alone.
+`KeypointObservation`: RGB frame O_t -> keypoints z_t = Psi(O_t). `KeypointRewardWrapper`: the
+environment's own reward is dropped for r_t of Eq. 8. What an agent sees and earns is a function of the
+frames, the demonstration and the number of steps taken, of nothing else.
 """
 
 from __future__ import annotations
@@ -28,10 +29,14 @@ class KeypointObservation(gym.ObservationWrapper):
 
 
 class KeypointRewardWrapper(gym.Wrapper):
-    """r_t of `reward` over a `KeypointObservation`; its parts go to `info["reward_parts"]`.
+    """r_t of a `KeypointReward` over a `KeypointObservation`; its parts go to `info["reward_parts"]`.
 
-    If the reward depends on time, the observation ends with the clock t / N in [0, 1]: without it the
-    same z_t would earn different rewards and the problem would not be Markov.
+    The observation is z_t (2K,), as in the paper. If the reward is timed, the same z_t earns different
+    rewards at different times, so the agent has to know the time. It is told in the demonstration's own
+    coordinates: (z_t, z_t - z_{t-1}, z^E_{t+1} - z_t, clock), (6K + 1,), where things are, how they
+    move, the way to where the demonstration will be, and how much of it has passed, 0 to 1. The clock
+    alone would do in theory; in practice an agent then has to learn the whole demonstration by heart
+    before it follows closely enough to touch the object, and without the motion it overshoots.
     """
 
     def __init__(self, env: gym.Env, reward):
@@ -39,22 +44,26 @@ class KeypointRewardWrapper(gym.Wrapper):
         self.keypoint_reward = reward
         low, high = env.observation_space.low, env.observation_space.high
         if reward.timed:
-            low, high = np.append(low, 0), np.append(high, 1)
-        self.observation_space = gym.spaces.Box(low, high, dtype=np.float32)
+            reach = high - low
+            low = np.concatenate([low, -reach, -reach, [0]])
+            high = np.concatenate([high, reach, reach, [1]])
+        self.observation_space = gym.spaces.Box(np.float32(low), np.float32(high))
 
     def reset(self, **kwargs):
         self._z, info = self.env.reset(**kwargs)
-        self._t = 0
-        return self._observation(), info
+        self._t, self._motion = 0, np.zeros_like(self._z)
+        return self._observe(), info
 
     def step(self, action):
         z, _, terminated, truncated, info = self.env.step(action)
         pair = self._z.reshape(-1, 2), z.reshape(-1, 2)  # z_t and z_{t+1}, (K, 2) each
         reward, parts = self.keypoint_reward(*pair, self._t)
-        self._z, self._t = z, self._t + 1
-        return self._observation(), reward, terminated, truncated, info | {"reward_parts": parts}
+        self._z, self._motion, self._t = z, z - self._z, self._t + 1
+        return self._observe(), reward, terminated, truncated, info | {"reward_parts": parts}
 
-    def _observation(self):
-        if not self.keypoint_reward.timed:
+    def _observe(self):
+        reward = self.keypoint_reward
+        if not reward.timed:
             return self._z
-        return np.append(self._z, np.float32(self.keypoint_reward.clock(self._t)))
+        ahead = reward.target(self._t).reshape(-1) - self._z
+        return np.concatenate([self._z, self._motion, ahead, [reward.clock(self._t)]]).astype(np.float32)

@@ -25,7 +25,7 @@ import numpy as np
 import torch
 
 import tasks
-from lbw_minimal import video
+from lbw_minimal import sac, video
 from lbw_minimal.imitate import Run, imitate, learn_perception, load_perception
 from lbw_minimal.report import wilson, write_report
 from lbw_minimal.training import InputError, pick_device, seed_everything
@@ -56,7 +56,7 @@ def parse(argv):
     parser.add_argument("--threads", type=int, default=0, help="torch threads (all cores)")
     parser.add_argument("--reward", choices=("mended", "literal"), default="mended")
     parser.add_argument("--from-scratch", action="store_true", help="train perception too")
-    parser.add_argument("--weights", type=Path, help="folder with perception weights (the shipped ones)")
+    parser.add_argument("--weights", type=Path, help="folder with trained weights (the shipped ones)")
     parser.add_argument("--evaluate", action="store_true", help="only replay the shipped policy")
     parser.add_argument("--resume", action="store_true", help="go on with the run in --out")
     parser.add_argument("--fast", action="store_true", help="a smoke run through every stage")
@@ -95,7 +95,7 @@ def run(args):
     """One task from its human video to its report. Returns the success rate."""
     name, module = args.what, task_module(args.what)
     recipe = dataclasses.replace(module.RECIPE, **FAST) if args.fast else module.RECIPE
-    device = pick_device(args.device)
+    pick_device(args.device)  # say so before anything else if there is none
     torch.set_num_threads(args.threads or os.cpu_count())
     from_scratch = args.from_scratch or args.fast or args.video is not None
 
@@ -106,11 +106,16 @@ def run(args):
         print(f"warning: {warning}", file=sys.stderr)
     random = demo[:0] if args.video else video.read(VIDEOS / name / "random.mp4")[0]
     perception = None if from_scratch else load_perception(args.weights or WEIGHTS / name, name)
+    policy = (args.weights or WEIGHTS / name) / "policy.safetensors"
+    if args.evaluate:
+        sac.load(policy)
     settings = {
         "task": name, "seed": args.seed, "reward": args.reward, "fast": args.fast,
         "from_scratch": from_scratch, "video": hashlib.sha256(demo.tobytes()).hexdigest()[:16],
     }  # fmt: skip
     out = prepare_folder(args.out or Path("runs") / name, settings, args.resume)
+    if args.evaluate:
+        shutil.copy(policy, out / "policy.safetensors")
     here = Run(out)
     here.metrics["settings"] = settings | {"recipe": dataclasses.asdict(recipe)}
     here.metrics["machine"] = f"{platform.machine()}, {os.cpu_count()} cores, torch {torch.__version__}"
@@ -124,7 +129,7 @@ def run(args):
     if from_scratch:
         seed_everything(args.seed)
         perception = learn_perception(
-            demo, random, robot, recipe, task=name, seed=args.seed, run=here, device=device
+            demo, random, robot, recipe, task=name, seed=args.seed, run=here, device=args.device
         )
         if "perception" not in here.metrics:
             here.metrics["perception"] = probe(task_id(name), perception, PROBE_SEED + args.seed)
@@ -141,8 +146,10 @@ def run(args):
     here.metrics["success"] = {"rate": wins / n, "low": low, "high": high, "episodes": n}
     here.metrics["memory_mb"] = round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
     here.save()
+    log = out / "policy_log.json"
+    log = json.loads(log.read_text()) if log.exists() else []  # a replayed policy brings none
     write_report(out / "report.html", task=name, demo=demo, translated=perception.translated,
-                 z_demo=perception.z_E, log=json.loads((out / "policy_log.json").read_text()),
+                 z_demo=perception.z_E, log=log,
                  episode=first, metrics=here.metrics, scene_html=scene)  # fmt: skip
     print(f"{name}: {wins}/{n} successes (95% CI {low:.2f}-{high:.2f})")
     print(f"report: {out / 'report.html'}")

@@ -24,6 +24,7 @@ FINGER = 0.012  # m, half the thickness of gripper and fingers: what the tip sta
 
 class Push(TaskEnv):
     __doc__ = __doc__
+    CONTACT = CUBE / 2 + FINGER
 
     def build(self):
         self.cube = self.world.box((CUBE / 2,) * 3, (CUBE_START, 0, CUBE / 2), RED, mass=CUBE_MASS)
@@ -49,12 +50,12 @@ class Push(TaskEnv):
         return np.linalg.norm(self.object_position() - self.target_position()) < SUCCESS
 
     def waypoints(self):
-        behind = CUBE / 2 + FINGER
-        x, y = self.object_position()[0], 0.0
+        behind = self.object_position()[0] - self.CONTACT - 0.025
+        end = np.array([TARGET - self.CONTACT, 0, 0.02])
         return [
-            (np.array([x - behind - 0.025, y, 0.02]), 0.6),
-            (np.array([TARGET - behind, y, 0.02]), 0.8),
-            (np.array([TARGET - behind, y, 0.02]), 0.2),  # the tip lags its goal by 2 / 20 s
+            (np.array([behind, 0, 0.02]), 0.6),
+            (end, 0.8),
+            (end, 0.2),  # the tip lags its goal by 2 / 20 s
         ]
 
 

@@ -139,6 +139,7 @@ class TaskEnv(gym.Env):
     LEASH = 0.03
     WORKSPACE = ((0.42, -0.01, 0.015), (0.74, 0.01, 0.17))  # m, box of the tip's goal
     START = (0.46, 0.0, 0.12)  # m, the tip at reset
+    CONTACT = None  # m along x from tip to object when they touch; None where nothing is touched
 
     def __init__(self, embodiment="robot", render_mode=None, observation="rgb", jitter=0.0):
         if embodiment not in LOOKS:
@@ -185,15 +186,25 @@ class TaskEnv(gym.Env):
     def reset(self, *, seed=None, options=None):
         super().reset(seed=seed)
         self.world.p.restoreState(self._fresh)
+        offset = self.np_random.uniform(-self.jitter, self.jitter, 4)
         scatter = bool((options or {}).get("scatter", False))
-        offset = np.array([*self.np_random.uniform(-self.jitter, self.jitter, 4)])
-        start = np.array(self.START) + (offset[0], 0, offset[1])
         if scatter:
-            low, high = np.array(self.WORKSPACE)
-            start = self.np_random.uniform(low, high)
-        self.arm.reset(start)
+            self.arm.reset(self.np_random.uniform(*self.WORKSPACE))
+        else:
+            self.arm.reset(np.array(self.START) + (offset[0], 0, offset[1]))
         self.place(np.array([offset[2], offset[3] / 2, 0]), scatter)
+        if scatter and self.CONTACT and self.np_random.random() < 0.5:
+            self._stand_beside()
         return self._observe(), self._info()
+
+    def _stand_beside(self):
+        """Put the tip low and next to the object: a task is about contact, and chance brings little."""
+        x = self.object_position()[0]
+        aside = self.np_random.uniform(self.CONTACT, self.CONTACT + 0.05)
+        side = self.np_random.choice([-1, 1], p=[0.65, 0.35])
+        if not self.WORKSPACE[0][0] < x + side * aside < self.WORKSPACE[1][0]:
+            side = -side
+        self.arm.reset(np.array([x + side * aside, 0, self.np_random.uniform(0.015, 0.05)]))
 
     def step(self, action):
         action = np.clip(np.asarray(action, float), -1, 1)
@@ -254,11 +265,16 @@ def expert_actions(env: TaskEnv, rng: np.random.Generator | None = None):
                 yield np.zeros(3, np.float32)
 
 
-def random_actions(rng: np.random.Generator):
+def random_actions(rng: np.random.Generator, towards: float = 0.0):
     """Yield random actions for ever, each held for 4 to 12 steps, so that the arm gets about and
-    bumps into things; independent ones would tremble on the spot."""
+    bumps into things; independent ones would tremble on the spot. `towards` -1 or 1 draws the step
+    along x from that half, and keeps the height."""
+    low, high = np.array([-1, -1, -1.0]), np.array([1, 1, 0.6])  # mostly low, where things are
+    if towards:
+        low[[0, 2]] = min(towards, 0), -0.4
+        high[[0, 2]] = max(towards, 0), 0.2
     while True:
-        action = rng.uniform((-1, -1, -1), (1, 1, 0.6)).astype(np.float32)  # mostly low, where things are
+        action = rng.uniform(low, high).astype(np.float32)
         for _ in range(rng.integers(4, 13)):
             yield action
 
@@ -266,15 +282,19 @@ def random_actions(rng: np.random.Generator):
 def record_random(env: TaskEnv, frames: int, seed: int, take: int = 25):
     """Film `frames` frames of random motion in takes of `take` frames, the object put anew for each.
 
-    Returns the frames (T, 84, 84, 3) uint8 and the true pixels (T, 4) of tip and object.
+    A take that starts next to the object moves towards it for its first half. Returns the frames
+    (T, 84, 84, 3) uint8 and the true pixels (T, 4) of tip and object.
     """
     rng = np.random.default_rng(seed)
     film, truth = [], []
     while len(film) < frames:
         film.append(env.reset(seed=int(rng.integers(2**31)), options={"scatter": True})[0])
         truth.append(env.true_pixels())
-        for _, action in zip(range(take - 1), random_actions(rng), strict=False):
-            film.append(env.step(action)[0])
+        gap = env.object_position() - env.arm.goal
+        beside = env.CONTACT and abs(gap[0]) < env.CONTACT + 0.05 and env.arm.goal[2] < 0.05
+        seek, roam = random_actions(rng, np.sign(gap[0])), random_actions(rng)
+        for i in range(1, take):
+            film.append(env.step(next(seek if beside and i < take / 2 else roam))[0])
             truth.append(env.true_pixels())
     return np.stack(film[:frames]), np.stack(truth[:frames])
 

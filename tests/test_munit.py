@@ -151,18 +151,24 @@ def test_frames_survive_the_way_to_images_and_back():
     assert images.shape == (2, 3, 4, 8) and np.array_equal(munit.to_frames(images), frames)
 
 
-def test_file_carries_sizes_weights_and_task(tmp_path):
-    model = MUNIT(2, style_dim=3, blocks=1, shared_content=False)
-    munit.save(tmp_path / "munit.safetensors", model, "push")
-    loaded, task = munit.load(tmp_path / "munit.safetensors")
-    assert task == "push" and loaded.sizes == model.sizes
+def test_file_carries_sizes_weights_and_style(tmp_path):
+    model, style = MUNIT(2, style_dim=3, blocks=1, shared_content=False), torch.tensor([1.0, 2.0, 3.0])
+    munit.save(tmp_path / "munit.safetensors", model, style, "push")
+    loaded, loaded_style = munit.load(tmp_path / "munit.safetensors", "push")
+    assert loaded.sizes == model.sizes and torch.equal(loaded_style, style)
     assert all(torch.equal(a, b) for a, b in zip(loaded.parameters(), model.parameters(), strict=True))
+
+
+def test_weights_of_another_task_are_refused(tmp_path):
+    munit.save(tmp_path / "munit.safetensors", MUNIT(2), torch.zeros(8), "reach")
+    with pytest.raises(InputError, match=r"munit\.safetensors: weights of the task reach, not of push"):
+        munit.load(tmp_path / "munit.safetensors", "push")
 
 
 def test_file_of_another_network_is_refused(tmp_path):
     save_state(tmp_path / "other.safetensors", {"kind": "transporter"})
     with pytest.raises(InputError, match=r"other\.safetensors: not the weights of a MUNIT"):
-        munit.load(tmp_path / "other.safetensors")
+        munit.load(tmp_path / "other.safetensors", "push")
 
 
 @pytest.fixture(scope="module")

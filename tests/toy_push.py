@@ -46,8 +46,8 @@ class ToyPush(gym.Env):
 
     def parts(self):
         """Centres (4, 2) of elbow, wrist, gripper, puck."""
-        elbow = (BASE + self.position) / 2 + [0, -0.2]
-        wrist = self.position + [-0.03, -0.2]
+        elbow = (BASE + self.position) / 2 + np.array([0, -0.2])
+        wrist = self.position + np.array([-0.03, -0.2])
         return np.stack([elbow, wrist, self.position, [self.puck, TABLE - HALF_PUCK]])
 
     def frame(self):
@@ -71,7 +71,7 @@ def detect(frames):
 
 
 def follow(env, waypoints):
-    """Frames of a scripted arm that visits (x, y, speed, pause) in turn; `pause` frames of rest after each."""
+    """Frames of a scripted arm that visits every (x, y) at `speed` and rests there for `pause` frames."""
     frames = [env.reset(seed=0)[0]]
     for x, y, speed, pause in waypoints:
         for _ in range(60):
@@ -89,8 +89,8 @@ def demonstration(goal=GOAL):
     """Frames of a slow 'human': rests, swings behind the puck, rests, pushes it to the goal, rests."""
     env = ToyPush()
     reach = HALF_PUCK + HALF_GRIPPER
-    rest = [(*START, 1, 4)]
-    return follow(env, rest + [(-0.3, 0.3, 0.35, 0), (-0.26, 0.5, 0.35, 4), (goal - reach, 0.5, 0.5, 3)])
+    behind, end = (-0.26, 0.5, 0.35, 4), (goal - reach, 0.5, 0.5, 3)
+    return follow(env, [(*START, 1, 4), (-0.3, 0.3, 0.35, 0), behind, end])
 
 
 def random_frames(n, seed=0):

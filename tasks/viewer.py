@@ -1,0 +1,246 @@
+"""The meshcat mirror of a PyBullet scene, recorded to one HTML page without a server, port or process.
+
+In: a client and the poses its links pass through. Out: a page in which the scene plays and turns with the
+mouse. A link's frame is animated; its shapes hang below it where the URDF puts them, so the browser computes
+    world <- link (URDF frame, animated) <- visual frame (fixed) <- drawing (fixed, e.g. y up to z up)
+Traps: the pose of a base is its centre of mass, not its frame; meshcat's cylinders lie along y, Bullet's
+along z; meshcat has no capsule.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+from itertools import pairwise
+from pathlib import Path
+from types import SimpleNamespace
+
+import meshcat
+import numpy as np
+import pybullet as p
+import umsgpack
+from meshcat import geometry as g
+from meshcat.animation import Animation, AnimationClip, AnimationTrack
+
+from lbw_minimal.training import write_atomic
+
+EYE, TARGET = (0.5, -1.2, 0.45), (0.42, 0.0, 0.22)  # m, from the side, like the environments' camera
+FOV = 46  # degrees, from bottom to top: the whole arm, where the environments' camera frames the skill
+CREASE = np.cos(np.radians(40))  # faces that meet at less than this angle are shaded as one round surface
+Y_TO_Z = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1.0]])  # turned by 90 degrees about x
+
+PAGE = """<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{title}</title>
+<style>body {{ margin: 0 }} #scene {{ width: 100vw; height: 100vh; overflow: hidden }}</style>
+</head>
+<body>
+<div id="scene"></div>
+<script>
+/* meshcat: Copyright (c) 2018 Robin Deits, MIT License. With it: */
+{notices}
+{meshcat}
+</script>
+<script>
+const pane = document.getElementById("scene"), viewer = new MeshCat.Viewer(pane);
+for (const command of {commands})
+  viewer.handle_command_bytearray(Uint8Array.from(atob(command), c => c.charCodeAt(0)));
+viewer.camera.fov = {fov};
+viewer.camera.position.set({eye});
+viewer.controls.target.set({target});
+viewer.controls.maxPolarAngle = Math.PI / 2;  // from below one sees the table only
+viewer.controls.update();
+if (window !== top) {{  // inside another page the wheel scrolls that page, until one clicks into the scene
+  viewer.controls.enableZoom = false;
+  pane.addEventListener("pointerdown", () => viewer.controls.enableZoom = true);
+  pane.addEventListener("mouseleave", () => viewer.controls.enableZoom = false);
+}}
+</script>
+</body>
+</html>
+"""
+
+
+class Mesh(g.Geometry):
+    """Triangles (F, 3, 3) in m, drawn with round surfaces round and edges sharp."""
+
+    def __init__(self, corners: np.ndarray):
+        super().__init__()
+        self.corners = corners
+
+    def lower(self, object_data):
+        arrays = {"position": self.corners, "normal": normals(self.corners)}
+        attributes = {k: g.pack_numpy_array(a.reshape(-1, 3).T.astype(np.float32)) for k, a in arrays.items()}
+        return {"uuid": self.uuid, "type": "BufferGeometry", "data": {"attributes": attributes}}
+
+
+def normals(corners: np.ndarray) -> np.ndarray:
+    """Unit normals (F, 3, 3) at triangles' corners: the mean of the faces that meet there without crease."""
+    face = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])  # (F, 3), length 2 x area
+    unit = face / np.maximum(np.linalg.norm(face, axis=1, keepdims=True), 1e-30)
+    # Files repeat a vertex for every face, so equal places make a corner, not equal indices.
+    size = max(np.ptp(corners.reshape(-1, 3), axis=0).max(), 1e-30)
+    _, corner = np.unique(np.round(corners.reshape(-1, 3) / size, 5), axis=0, return_inverse=True)
+    corner = corner.reshape(-1, 3)
+    out = np.empty_like(corners)
+    order = np.argsort(corner, axis=None)
+    for group in np.split(order, np.cumsum(np.bincount(corner.ravel()))[:-1]):
+        f = group // 3  # the faces that meet in this corner
+        smooth = unit[f] @ unit[f].T > CREASE  # (n, n)
+        out.reshape(-1, 3)[group] = smooth @ face[f]
+    length = np.linalg.norm(out, axis=-1, keepdims=True)
+    return np.where(length > 1e-30, out / np.maximum(length, 1e-30), unit[:, None])
+
+
+def read_mesh(path: Path | str) -> np.ndarray:
+    """Triangles (F, 3, 3) of a Wavefront OBJ or binary STL file. Raises ValueError for any other."""
+    path = Path(path)
+    if path.suffix.lower() == ".stl":
+        data = np.fromfile(path, np.uint8)[80:]  # an 80-byte title, the count, then 50 bytes a triangle
+        count = data[:4].view("<u4")[0] if len(data) >= 4 else -1
+        if len(data) != 4 + 50 * int(count):
+            raise ValueError(f"{path.name}: not a binary STL file; export it as one.")
+        return data[4:].reshape(-1, 50)[:, 12:48].copy().view("<f4").reshape(-1, 3, 3).astype(float)
+    if path.suffix.lower() != ".obj":
+        raise ValueError(f"{path.name}: the viewer reads OBJ and binary STL meshes; convert it.")
+    vertices, faces = [], []
+    for line in path.read_text(errors="replace").splitlines():
+        kind, *rest = line.split() or [""]
+        if kind == "v":
+            vertices.append([float(x) for x in rest[:3]])
+        elif kind == "f":
+            # Indices start at 1; negative ones count back from the last vertex so far.
+            ids = [int(x.split("/")[0]) for x in rest]
+            ids = [i - 1 if i > 0 else len(vertices) + i for i in ids]
+            faces += [(ids[0], b, c) for b, c in pairwise(ids[1:])]
+    return np.array(vertices)[np.array(faces)]
+
+
+def transform(position, quaternion) -> np.ndarray:
+    """4x4 matrix of a position in m and a quaternion (x, y, z, w)."""
+    T = np.eye(4)
+    T[:3, :3] = np.reshape(p.getMatrixFromQuaternion(quaternion), (3, 3))
+    T[:3, 3] = position
+    return T
+
+
+def drawing(kind: int, size, file: str) -> list[tuple[g.Geometry, np.ndarray]]:
+    """What draws a visual shape of `getVisualShapeData`: geometries, each with its 4x4 place in its frame."""
+    at = np.eye(4)
+    if kind == p.GEOM_BOX:
+        return [(g.Box([*size]), at)]  # full lengths
+    if kind == p.GEOM_SPHERE:
+        return [(g.Sphere(size[0]), at)]
+    if kind == p.GEOM_CYLINDER:
+        return [(g.Cylinder(size[0], size[1]), Y_TO_Z)]
+    if kind == p.GEOM_CAPSULE:
+        ends = [(g.Sphere(size[1]), transform((0, 0, z), (0, 0, 0, 1))) for z in (-size[0] / 2, size[0] / 2)]
+        return [(g.Cylinder(size[0], size[1]), Y_TO_Z), *ends]
+    if kind == p.GEOM_MESH:
+        return [(Mesh(read_mesh(file) * size), at)]
+    raise ValueError(
+        f"the viewer cannot draw a shape of PyBullet's type {kind}; use boxes, balls and meshes."
+    )
+
+
+class Recorder:
+    """Records the bodies of a PyBullet client for the browser: all of them, or those listed by id.
+
+    Shapes and colours are read now, poses at every `snap`. Raises ValueError for a shape it cannot draw.
+    """
+
+    def __init__(self, client: int, bodies=None):
+        self.client = client
+        self.frames = []  # an array (L, 7) each: position in m and quaternion (x, y, z, w) of every link
+        self.shapes = []  # (link's row, geometry, 4x4 place in the link's frame, rgba)
+        self.links = []  # (body, link) with something to draw; the base is link -1
+        if bodies is None:
+            bodies = [p.getBodyUniqueId(i, client) for i in range(p.getNumBodies(client))]
+        for body in bodies:
+            for _, link, kind, size, file, position, quaternion, rgba, *_ in p.getVisualShapeData(
+                body, physicsClientId=client
+            ):
+                if (body, link) not in self.links:
+                    self.links.append((body, link))
+                row, visual = self.links.index((body, link)), transform(position, quaternion)
+                for geometry, at in drawing(kind, size, file.decode()):
+                    self.shapes.append((row, geometry, visual @ at, rgba))
+
+    def snap(self) -> None:
+        """Append the current pose of every link as one frame of the animation."""
+        self.frames.append(np.array([np.concatenate(self._pose(*link)) for link in self.links]))
+
+    def _pose(self, body, link):
+        """Position and quaternion of a link's URDF frame, in which its visual frames are given."""
+        if link >= 0:
+            return p.getLinkState(body, link, computeForwardKinematics=True, physicsClientId=self.client)[4:6]
+        mass = p.getBasePositionAndOrientation(body, self.client)
+        inertial = p.getDynamicsInfo(body, -1, self.client)[3:5]
+        return p.multiplyTransforms(*mass, *p.invertTransform(*inertial))
+
+    def html(self, title: str, fps: float = 25, eye=EYE, target=TARGET) -> str:
+        """A page that needs nothing else: the recorded frames, `fps` a second, over and over.
+
+        eye, target: where the camera stands and looks, in m. Without a `snap` the scene stands as it is now.
+        """
+        if not self.frames:
+            self.snap()
+        tape = []
+        scene = meshcat.Visualizer(window=SimpleNamespace(send=tape.append))
+        scene["/Grid"].set_property("visible", False)  # it would lie in the table's top
+        scene["/Axes"].set_property("visible", False)
+        scene["/Background"].set_property("top_color", [0.93, 0.94, 0.96])
+        scene["/Background"].set_property("bottom_color", [0.80, 0.82, 0.85])
+        for i, (row, geometry, at, rgba) in enumerate(self.shapes):
+            r, green, b = (round(255 * c) for c in rgba[:3])
+            mesh = g.Mesh(geometry, g.MeshPhongMaterial(color=r << 16 | green << 8 | b, opacity=rgba[3]))
+            # Ids of meshcat's own making carry the computer's network address.
+            mesh.uuid, geometry.uuid, mesh.material.uuid = (
+                f"{part}{i}" for part in ("mesh", "shape", "paint")
+            )
+            node = scene["/".join(map(str, self.links[row]))][f"shape{i}"]
+            node.set_object(mesh)
+            node.set_transform(at)
+        poses = np.stack(self.frames)  # (T, L, 7)
+        animation = Animation()
+        times = [*range(len(poses)), len(poses) - 1 + fps]  # a second's rest before it starts over
+        for row, link in enumerate(self.links):
+            node = scene["/".join(map(str, link))]
+            node.set_transform(transform(poses[0, row, :3], poses[0, row, 3:]))
+            if np.ptp(poses[:, row], axis=0).any():
+                path = [*poses[:, row].tolist(), poses[-1, row].tolist()]
+                tracks = {
+                    "position": AnimationTrack("position", "vector3", times, [x[:3] for x in path]),
+                    "quaternion": AnimationTrack("quaternion", "quaternion", times, [x[3:] for x in path]),
+                }
+                animation.clips[node.path] = AnimationClip(tracks, fps)
+        if animation.clips:
+            scene.set_animation(animation, repetitions=float("inf"))
+        dist = Path(meshcat.__file__).parent / "viewer" / "dist"
+        return PAGE.format(
+            title=html.escape(title),
+            notices=(dist / "main.min.js.LICENSE.txt").read_text(),
+            meshcat=(dist / "main.min.js").read_text(),
+            commands=[base64.b64encode(pack(c)).decode() for c in tape],
+            fov=FOV,
+            eye=y_up(eye),
+            target=y_up(target),
+        )
+
+    def save(self, path: Path | str, title: str = "PyBullet scene", **options) -> None:
+        """Write `html(title, **options)` to a file, whole or not at all."""
+        write_atomic(path, self.html(title, **options))
+
+
+def pack(command) -> bytes:
+    """A meshcat command as its viewer expects it; four bytes a number hold 0.1 micrometre at 1 m."""
+    return umsgpack.packb(command.lower(), force_float_precision="single")
+
+
+def y_up(point) -> str:
+    """A point in m for the camera, whose y axis points up where ours is z: x, z, -y as JavaScript."""
+    x, y, z = point
+    return f"{float(x)}, {float(z)}, {float(-y)}"

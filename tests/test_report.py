@@ -1,0 +1,235 @@
+"""The page of a run: complete, self-contained, small; its pictures right to the pixel."""
+
+import base64
+import io
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from lbw_minimal import report
+
+T, N, K = 4, 9, 3
+SCENE = "<!DOCTYPE html><html><body><p title=\"a & b\">scene</p><script>'<b>' && 1</script></body></html>"
+
+
+def frames(n):
+    """A square that moves to the right on a plain table."""
+    out = np.full((n, 84, 84, 3), 120, np.uint8)
+    for i in range(n):
+        out[i, 40:50, 5 + i : 15 + i] = (200, 30, 30)
+    return out
+
+
+def example():
+    """What a run knows in the end."""
+    z = np.random.default_rng(0).uniform(-1, 1, (N, K, 2))
+    return {
+        "task": "push", "demo": frames(N), "translated": frames(N), "z_demo": z,
+        "log": [{"step": 50 * i, "return": -1.0 * i, "success": i > 2} for i in range(1, 6)],
+        "episode": {"frames": frames(T), "z": z[:T], "parts": [{"r1": -0.1, "r2": -0.2}] * T},
+        "metrics": {
+            "success": {"rate": 0.9, "low": 0.596, "high": 0.982, "episodes": 10},
+            "episodes": [{"success": i != 3, "first_success": 2} for i in range(10)],
+            "stages": {"translation": 600.0, "policy": 60.0},
+            "perception": {"robot": {"tip_x": {"r2": 0.987, "px": 0.42}, "object_y": {"r2": None, "px": 0.1}},
+                           "keypoint_std": [0.25]},
+            "settings": {"seed": 7, "reward": "literal", "recipe": {"K": 5}}, "machine": "two cores",
+        },
+        "scene_html": SCENE, "command": "python -m tasks push --seed 7",
+    }  # fmt: skip
+
+
+def written(folder, run):
+    report.write_report(folder / "report.html", **run)
+    return (folder / "report.html").read_text()
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("run")
+
+
+@pytest.fixture(scope="module")
+def page(folder):
+    return written(folder, example())
+
+
+@pytest.fixture
+def run():
+    """The demonstration alone, for tests of one part."""
+    return {k: v for k, v in example().items() if k in ("task", "demo", "translated", "z_demo")}
+
+
+def titles(page):
+    return re.findall(r"<h2>(.*?)</h2>", page)
+
+
+def test_wilson_gives_the_published_values():
+    """10 of 10 and 5 of 10 by hand: n / (n + z^2), and 1/2 -+ z / (2 sqrt(n + z^2)), z^2 = 3.8415."""
+    np.testing.assert_allclose(report.wilson(10, 10), (10 / 13.8415, 1), atol=1e-5)
+    np.testing.assert_allclose(report.wilson(5, 10), (0.236593, 0.763407), atol=1e-5)
+
+
+def test_wilson_is_symmetric():
+    low, high = report.wilson(2, 13)
+    assert report.wilson(11, 13) == pytest.approx((1 - high, 1 - low))
+
+
+@pytest.mark.parametrize(("wins", "n"), [(0, 0), (3, 2), (-1, 5)])
+def test_wilson_refuses_impossible_counts(wins, n):
+    with pytest.raises(ValueError, match="successes"):
+        report.wilson(wins, n)
+
+
+def test_a_keypoint_is_drawn_on_the_pixel_it_names():
+    """z = (-1 + 2 (20.5) / 84, ...) is the centre of pixel 20: columns 80 to 83 of the enlarged frame."""
+    z = np.array([[[2 * 20.5 / 84 - 1, 2 * 60.5 / 84 - 1]]])
+    image = report.draw_keypoints(np.zeros((1, 84, 84, 3), np.uint8), z, scale=3)[0]
+    rows, columns = np.nonzero(image.any(-1))
+    assert abs(columns.mean() - 61) < 0.1 and abs(rows.mean() - 181) < 0.1
+    assert tuple(image[181, 61]) == report.colour(0)
+
+
+def test_drawing_leaves_the_frames_alone():
+    frames = np.zeros((2, 84, 84, 3), np.uint8)
+    report.draw_keypoints(frames, np.zeros((2, K, 2)), scale=1)
+    assert not frames.any()
+
+
+def test_a_keypoint_outside_the_image_is_no_error():
+    image = report.draw_keypoints(np.zeros((1, 84, 84, 3), np.uint8), np.full((1, 1, 2), 1.5))
+    assert not image.any()
+
+
+def test_a_strip_shows_first_and_last_frame():
+    frames = np.arange(20, dtype=np.uint8)[:, None, None, None] * np.ones((84, 84, 3), np.uint8)
+    image = report.strip(frames, n=4, scale=2)
+    assert image.shape == (168, 4 * 168, 3)
+    assert [image[0, 168 * i, 0] for i in range(4)] == [0, 6, 13, 19]
+
+
+def test_a_video_shorter_than_the_strip_shows_each_frame_once():
+    assert report.strip(np.zeros((3, 84, 84, 3), np.uint8), n=8, scale=1).shape == (84, 3 * 84, 3)
+
+
+def test_the_curve_shows_the_mean_of_the_last_episodes():
+    log = [{"step": 50 * i, "return": -i, "success": i % 2 == 0} for i in range(1, 5)]
+    above, below = report.curve(log, last=2).axes
+    np.testing.assert_allclose(above.lines[1].get_ydata(), [0, 0.5, 0.5, 0.5])
+    np.testing.assert_allclose(below.lines[1].get_ydata(), [-1, -1.5, -2.5, -3.5])
+
+
+def test_down_is_down_in_the_plots_of_keypoints():
+    z = np.zeros((4, K, 2))
+    for axis in (report.paths(z, z).axes[0], report.courses(z, z).axes[1]):
+        top, bottom = axis.get_ylim()[::-1]
+        assert top < bottom
+
+
+def test_the_film_keeps_every_frame_and_loops():
+    frames = np.random.default_rng(0).integers(0, 256, (5, 84, 84, 3), np.uint8)
+    with Image.open(io.BytesIO(report.film(frames, 12.5))) as film:
+        assert (film.n_frames, film.info["loop"], film.size) == (5, 0, (84, 84))
+        film.load()
+        assert film.info["duration"] == 80  # ms
+
+
+def test_the_page_has_every_section(page):
+    assert len(titles(page)) == 10
+    assert page.count("<img") == 8 + 1 + 2 + 1 + 1  # columns, film, paths, curve, reward
+    for text in ("9 of 10", "60-98 %", "11.0 min", "0.987 (0.4)", "python -m tasks push --seed 7",
+                 "two cores", "keypoint std", "recipe K", "✓ ✓ ✓ ✗ ✓"):  # fmt: skip
+        assert text in page
+
+
+class Outside(HTMLParser):
+    """Collects what a page would load."""
+
+    def __init__(self):
+        super().__init__()
+        self.loads = []
+
+    def handle_starttag(self, tag, attributes):
+        self.loads += [v for k, v in attributes if k in ("src", "href", "data", "poster", "srcset")]
+
+
+def test_the_page_loads_nothing_from_elsewhere(page):
+    parser = Outside()
+    parser.feed(page)
+    assert parser.loads and all(v.startswith("data:") for v in parser.loads)
+    assert not re.search(r"https?://|url\(|@import", page)
+
+
+def test_the_page_names_no_path_of_the_machine(page, folder):
+    decoded = [base64.b64decode(d).decode(errors="ignore") for d in re.findall(r"base64,([^\"]*)", page)]
+    assert not [text for text in (page, *decoded) if str(folder) in text or "/lib/python" in text]
+
+
+def test_the_same_run_gives_the_same_page(page, folder):
+    """No date, no chance ids: two runs can be compared by their files."""
+    assert written(folder, example()) == page
+
+
+def test_the_scene_comes_through_unchanged(page):
+    class Frame(HTMLParser):
+        def handle_starttag(self, tag, attributes):
+            if tag == "iframe":
+                self.scene = dict(attributes)["srcdoc"]
+
+    parser = Frame()
+    parser.feed(page)
+    assert parser.scene == SCENE
+
+
+@pytest.mark.parametrize(
+    ("part", "shown"),
+    [
+        ("log", ["How the robot learnt"]),
+        ("scene_html", ["The same episode in three dimensions"]),
+        ("command", ["To make this run again"]),
+        ("metrics", ["Time", "Perception, measured", "Settings"]),
+    ],
+)
+def test_each_part_is_shown_without_the_others(tmp_path, run, part, shown):
+    assert titles(written(tmp_path, run | {part: example()[part]}))[1:] == shown
+
+
+def test_the_demonstration_alone_makes_a_page(tmp_path, run):
+    page = written(tmp_path, run)
+    assert len(titles(page)) == 1 and "None" not in page
+
+
+def test_observations_with_a_clock_serve_as_keypoints(page, tmp_path):
+    run = example()
+    z = run["episode"]["z"].reshape(T, -1)
+    run["episode"]["z"] = np.concatenate([z, np.linspace(0, 1, T)[:, None]], axis=1)
+    assert written(tmp_path, run) == page
+
+
+def test_a_page_of_real_size_stays_small(tmp_path):
+    """50 frames of an episode and the largest scene."""
+    run = example() | {"scene_html": "x" * 2_000_000}
+    run["episode"] |= {"frames": frames(50), "z": np.zeros((50, K, 2))}
+    assert len(written(tmp_path, run).encode()) < 4e6
+
+
+def test_a_smoke_run_says_so(tmp_path, page, run):
+    assert "smoke run" not in page
+    assert "smoke run" in written(tmp_path, run | {"metrics": {"settings": {"fast": True}}})
+
+
+def test_text_of_the_run_cannot_break_the_page(tmp_path, run):
+    run |= {"task": "<script>x", "command": "a & b < c", "metrics": {"settings": {"video": '"><script>y'}}}
+    page = written(tmp_path, run)
+    assert "<script>x" not in page and "<script>y" not in page and "a &amp; b &lt; c" in page
+
+
+def test_a_failure_on_the_way_leaves_the_old_page(tmp_path, run, monkeypatch):
+    (tmp_path / "report.html").write_text("old")
+    monkeypatch.setattr("os.replace", lambda *paths: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        written(tmp_path, run)
+    assert (tmp_path / "report.html").read_text() == "old"

@@ -1,0 +1,221 @@
+"""What Eq. 8-10 pay, computed by hand, and what the mended form pays for on a toy of the push task."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from toy_push import HALF_GRIPPER, HALF_PUCK, ToyPush, demonstration, detect, follow, random_frames
+
+from lbw_minimal.reward import KeypointReward, keypoint_noise, keypoint_weights, resample, trim_pauses
+from lbw_minimal.training import InputError
+
+HORIZON = ToyPush.horizon
+MENDS = ("trim", "speed", "include_goal", "weights", "timed")
+
+
+def line(*x):
+    """A trajectory of one keypoint along y = 0: (N, 1, 2)."""
+    return np.stack([np.array(x, float), np.zeros(len(x))], -1)[:, None]
+
+
+def random_walk(K, n=400, step=0.1, seed=0):
+    return np.cumsum(np.random.default_rng(seed).normal(size=(n, K, 2)) * step / (2 * K) ** 0.5, axis=0)
+
+
+def total(reward, z):
+    """What an episode through the keypoints z (T + 1, K, 2) earns."""
+    return sum(reward(a, b, t)[0] for t, (a, b) in enumerate(pairwise(z)))
+
+
+@pytest.fixture(scope="module")
+def toy():
+    return detect(demonstration()), detect(random_frames(500))
+
+
+def mended(toy, **switches):
+    return KeypointReward(*toy, horizon=HORIZON, **switches)
+
+
+def episode(z):
+    """The keypoints z, then rest in the last ones until the horizon."""
+    return np.concatenate([z, np.repeat(z[-1:], HORIZON + 1 - len(z), axis=0)])
+
+
+def acted(*waypoints):
+    """Keypoints of an episode in which the toy's arm visits `waypoints`."""
+    return episode(detect(follow(ToyPush(), waypoints)))[: HORIZON + 1]
+
+
+def replay(toy):
+    """The demonstration acted out by the robot at its own pace, without the pauses."""
+    return acted((-0.3, 0.3, 0.7, 0), (-0.26, 0.5, 0.7, 0), (0.55 - HALF_PUCK - HALF_GRIPPER, 0.5, 0.8, 0))
+
+
+# The paper's form ---------------------------------------------------------------------------------
+
+
+def test_eq_9_is_the_distance_to_the_nearest_frame_and_looks_at_z_t():
+    reward = KeypointReward(line(0, 1, 3), form="literal")
+    assert reward(line(0.8)[0], line(5)[0])[1]["r1"] == pytest.approx(-0.2)
+
+
+def test_eq_9_leaves_the_goal_frame_out():
+    reward = KeypointReward(line(0, 1, 3), form="literal")
+    assert reward(line(3)[0], line(3)[0])[1]["r1"] == pytest.approx(-2)  # p <= N - 1: nearest is x = 1
+
+
+def test_eq_10_is_the_distance_to_the_nearest_step_wherever_it_was_made():
+    reward = KeypointReward(line(0, 1, 3), form="literal")  # steps 1 and 2
+    assert reward(line(0)[0], line(1.7)[0])[1]["r2"] == pytest.approx(-0.3)
+
+
+def test_norms_run_over_all_keypoints_at_once():
+    reward = KeypointReward(np.zeros((3, 2, 2)), form="literal")
+    z = np.array([[3.0, 0.0], [0.0, 4.0]])
+    assert reward(z, z)[1] == {"r1": pytest.approx(-5), "r2": 0}
+
+
+def test_eq_8_weighs_the_parts_by_lambda():
+    reward = KeypointReward(line(0, 1, 3), form="literal", lam=(2, 10))
+    r, parts = reward(line(0.8)[0], line(2.5)[0])
+    assert r == pytest.approx(2 * parts["r1"] + 10 * parts["r2"]) == pytest.approx(-0.4 - 3)
+
+
+def test_idle_agent_wins_under_the_literal_reward(toy):
+    """The trap: the demonstration starts at the robot's pose and pauses, so standing still is perfect."""
+    literal = KeypointReward(toy[0], form="literal")
+    idle = np.repeat(toy[0][:1], HORIZON + 1, axis=0)
+    assert total(literal, idle) == 0 >= total(literal, episode(toy[0]))
+
+
+# The mended form ----------------------------------------------------------------------------------
+
+
+def test_idle_agent_scores_far_below_the_replayed_demonstration(toy):
+    reward = mended(toy)
+    assert total(reward, acted()) < 3 * total(reward, replay(toy))
+
+
+def test_arm_that_never_touches_the_object_scores_below_the_replay(toy):
+    """The arm goes where it should but its puck stays where it was."""
+    touchless = replay(toy).copy()
+    touchless[:, 3] = touchless[0, 3]
+    assert total(mended(toy), touchless) < 2 * total(mended(toy), replay(toy))
+
+
+def test_the_further_the_object_gets_the_more_it_earns(toy):
+    way = (-0.3, 0.3, 0.7, 0), (-0.26, 0.5, 0.7, 0)
+    scores = [total(mended(toy), acted(*way, (x, 0.5, 0.8, 0))) for x in (-0.2, 0.0, 0.2, 0.38)]
+    assert scores == sorted(scores)
+
+
+def test_following_exactly_earns_nothing_less_than_zero(toy):
+    reward = mended(toy)
+    assert total(reward, episode(reward.z_E)) == pytest.approx(0, abs=1e-9)
+
+
+def test_idle_agent_seen_at_the_end_is_the_unit_of_r1():
+    z = line(0, 0.1, 0.2, 0.3, 0.4, 0.5)
+    reward = KeypointReward(z, random_walk(1))
+    assert reward(z[0], z[0], t=100)[1]["r1"] == pytest.approx(-1)
+
+
+def test_reward_is_bounded_whatever_the_keypoints_do(toy):
+    wild = np.random.default_rng(0).uniform(-1e6, 1e6, (200, 4, 2))
+    reward = mended(toy)
+    assert all(-4 <= reward(a, b, t)[0] <= 0 for t, (a, b) in enumerate(pairwise(wild)))
+
+
+def test_one_lost_keypoint_costs_no_more_than_its_share(toy):
+    reward = mended(toy)
+    z = reward.z_E[5].copy()
+    z[1] = 1e6
+    assert reward(reward.z_E[4], z, 4)[1]["r1"] == pytest.approx(-2 * reward.w[1])
+
+
+def test_one_lost_keypoint_in_the_demonstration_changes_little(toy):
+    z, robot = toy
+    glitched = z.copy()
+    glitched[12, 3] = (-1, -1)
+    assert np.abs(mended((glitched, robot)).z_E - mended(toy).z_E).max() < 0.05
+
+
+def test_staying_behind_costs_only_if_the_reward_is_timed(toy):
+    idle = acted()
+    assert total(mended(toy), idle) < 5 * total(mended(toy, timed=False), idle)
+
+
+def test_without_the_goal_frame_the_frame_before_it_is_the_target(toy):
+    with_goal, without = mended(toy), mended(toy, include_goal=False)
+    assert (with_goal.target(99) == with_goal.z_E[-1]).all() and (without.target(99) == without.z_E[-2]).all()
+
+
+@pytest.mark.parametrize("mend", MENDS)
+def test_every_mend_can_be_switched_off_alone(toy, mend):
+    z = replay(toy)
+    assert total(mended(toy, **{mend: False}), z) != pytest.approx(total(mended(toy), z), abs=1e-6)
+
+
+# Its preparation ----------------------------------------------------------------------------------
+
+
+def test_trimming_cuts_pauses_and_keeps_start_and_goal():
+    z = line(0, 0, 0.01, 1, 1, 1.01, 2, 2.02)
+    assert trim_pauses(z, 0.5)[:, 0, 0].tolist() == [0, 1, 2, 2.02]
+
+
+def test_trimming_keeps_slow_motion_that_adds_up():
+    z = line(0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7)
+    assert trim_pauses(z, 0.25)[:, 0, 0].tolist() == [0, 0.3, 0.6, 0.7]
+
+
+def test_resampling_matches_the_median_step():
+    z = resample(line(*np.linspace(0, 1, 21)), 0.1, 1000)
+    assert np.diff(z[:, 0, 0]) == pytest.approx(np.full(10, 0.1))
+
+
+def test_resampling_keeps_a_strike_faster_than_its_approach():
+    x = resample(line(0, 0.1, 0.2, 0.3, 0.4, 0.8, 1.2), 0.05, 1000)[:, 0, 0]
+    assert x[-1] - x[-2] == pytest.approx(4 * (x[1] - x[0]))
+
+
+def test_a_long_demonstration_leaves_time_to_reach_its_goal(toy):
+    slow = np.repeat(toy[0], 10, axis=0) + np.linspace(0, 0.5, 10 * len(toy[0]))[:, None, None]
+    assert len(mended((slow, toy[1]), trim=False)) <= 0.7 * HORIZON
+
+
+def test_jitter_is_measured_under_motion():
+    rng = np.random.default_rng(0)
+    still = np.sin(np.linspace(0, 20, 3000))[:, None, None] * np.ones((1, 2, 2))
+    noisy = still + rng.normal(size=still.shape) * np.array([0.01, 0.03])[:, None]
+    assert keypoint_noise(noisy) == pytest.approx([0.01, 0.03], rel=0.1)
+
+
+def test_a_keypoint_that_only_jitters_has_no_weight(toy):
+    z, robot = (
+        np.concatenate([a, 0.01 * np.random.default_rng(0).normal(size=(len(a), 1, 2))], 1) for a in toy
+    )
+    assert keypoint_weights(z, robot)[4] == 0
+
+
+def test_the_object_outweighs_every_keypoint_of_the_arm(toy):
+    w = mended(toy).w
+    assert w.argmax() == 3 and w.sum() == pytest.approx(1)
+
+
+# What comes in wrong ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((np.zeros((5, 2)), random_walk(1)), "shape"),
+        ((np.zeros((2, 1, 2)), random_walk(1)), "shape"),
+        ((line(0, 1, 2), random_walk(3)), "robot keypoints"),
+        ((line(0, 1, 2), None), "robot keypoints"),
+        ((line(1, 1, 1, 1), random_walk(1)), "nothing moves"),
+    ],
+)
+def test_wrong_input_is_refused_in_a_sentence(arguments, message):
+    with pytest.raises(InputError, match=message):
+        KeypointReward(*arguments)

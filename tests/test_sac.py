@@ -1,0 +1,233 @@
+"""Soft actor-critic against its equations, and against the mistakes others made before."""
+
+import gymnasium as gym
+import numpy as np
+import pytest
+import torch
+
+from lbw_minimal import sac as module
+from lbw_minimal.sac import SAC, Actor, ReplayBuffer, TwinCritic, train
+from lbw_minimal.training import Checkpoint
+
+
+class Walk(gym.Env):
+    """A point on a line is paid for standing at 0.5; 20 steps, never terminal."""
+
+    observation_space = gym.spaces.Box(-2, 2, (1,), np.float32)
+    action_space = gym.spaces.Box(-1, 1, (1,), np.float32)
+    flip_success = False  # for a test that this label teaches nothing
+
+    def reset(self, seed=None, options=None):
+        super().reset(seed=seed)
+        self.t, self.x = 0, self.np_random.uniform(-1, 1)
+        return np.array([self.x], np.float32), {}
+
+    def step(self, action):
+        self.t, self.x = self.t + 1, float(np.clip(self.x + 0.2 * action[0], -2, 2))
+        parts = {"r1": -abs(self.x - 0.5), "r2": 0.0}
+        info = {"is_success": (abs(self.x - 0.5) < 0.1) != self.flip_success, "reward_parts": parts}
+        return np.array([self.x], np.float32), parts["r1"], False, self.t >= 20, info
+
+
+class Stop(Exception):
+    """Where a test cuts a training off."""
+
+
+def batch_of(n=8, obs_dim=3, action_dim=2, seed=0, **fixed):
+    g = torch.Generator().manual_seed(seed)
+    draw = lambda *shape: torch.randn(*shape, generator=g)  # noqa: E731
+    batch = {"obs": draw(n, obs_dim), "action": draw(n, action_dim).tanh(), "reward": draw(n)}
+    return batch | {"next_obs": draw(n, obs_dim), "terminal": torch.zeros(n)} | fixed
+
+
+def small(**recipe):
+    torch.manual_seed(0)
+    return SAC(3, 2, width=16, **recipe)
+
+
+# The actor and the critics ------------------------------------------------------------------------
+
+
+def test_log_density_of_a_squashed_action_is_that_of_torch():
+    torch.manual_seed(0)
+    actor, s = Actor(3, 2, 16), torch.randn(5, 3)
+    a, log_pi = actor.sample(s)
+    mean, log_std = actor(s)
+    normal = torch.distributions.Normal(mean, log_std.exp())
+    squashed = torch.distributions.TransformedDistribution(normal, torch.distributions.TanhTransform())
+    assert torch.allclose(log_pi, squashed.log_prob(a).sum(-1), atol=1e-3)
+
+
+def test_log_density_stays_finite_at_the_ends_of_the_range():
+    actor = Actor(1, 1, 8)
+    actor.net[-1].bias.data[0] = 50.0
+    a, log_pi = actor.sample(torch.zeros(100, 1))
+    assert (a == 1).all() and log_pi.isfinite().all()
+
+
+def test_the_two_critics_are_two_plain_networks():
+    """The batched product against one critic at a time."""
+    torch.manual_seed(0)
+    critic, s, a = TwinCritic(3, 2, 16), torch.randn(5, 3), torch.randn(5, 2)
+    for i in range(2):
+        x = torch.cat([s, a], 1)
+        for j in range(2):
+            x = x @ critic.weights[j][i]
+            x = (x - x.mean(1, keepdim=True)) / (x.var(1, correction=0, keepdim=True) + 1e-5).sqrt()
+            x = (x + critic.biases[j][i]).relu()
+        q = x @ critic.weights[2][i] + critic.biases[2][i]
+        assert torch.allclose(critic(s, a)[i], q[:, 0], atol=1e-5)
+
+
+# One update ---------------------------------------------------------------------------------------
+
+
+def test_the_target_holds_the_entropy_term():
+    """Equal Q and equal draws: what doubling alpha takes off the target is gamma alpha log pi."""
+    sac, batch = small(alpha=0.5), batch_of(reward=torch.zeros(8))
+    torch.manual_seed(1)
+    _, log_pi = sac.actor.sample(sac.normalise(batch["next_obs"]))
+    targets = []
+    for alpha in (0.5, 1.0):
+        sac.log_alpha.data.fill_(np.log(alpha))
+        torch.manual_seed(1)
+        targets.append(sac.critic_target(batch))
+    assert torch.allclose(targets[0] - targets[1], sac.gamma * 0.5 * log_pi, atol=1e-5)
+
+
+def test_only_a_terminal_state_ends_the_sum():
+    reward = torch.arange(8.0)
+    sac = small()
+    ended = sac.critic_target(batch_of(reward=reward, terminal=torch.ones(8)))
+    goes_on = sac.critic_target(batch_of(reward=reward))
+    assert torch.equal(ended, reward) and not torch.isclose(goes_on, reward).any()
+
+
+def test_the_actor_is_trained_with_alpha():
+    """With a huge alpha entropy is all that counts, so the policy must spread."""
+    spread = []
+    for alpha in (1e-6, 1e3):
+        sac, batch = small(alpha=alpha), batch_of(64)
+        before = sac.actor(batch["obs"])[1].mean()
+        for _ in range(20):
+            sac.log_alpha.data.fill_(np.log(alpha))
+            sac.update(batch)
+        spread.append((sac.actor(batch["obs"])[1].mean() - before).item())
+    assert spread[1] > spread[0] + 0.1
+
+
+def test_alpha_rises_when_entropy_is_below_minus_the_number_of_actions():
+    """Three actions with entropy -2: above -3, so alpha falls; -A/2 = -1.5 would make it rise."""
+    sac = SAC(3, 3, width=16)
+    log_pi = torch.full((8,), 2.0)
+    sac.actor.sample = lambda s: (sac.actor(s)[0].tanh(), log_pi)
+    before = sac.alpha
+    sac.update(batch_of(action_dim=3))
+    assert sac.alpha < before
+    log_pi[:] = 4.0
+    before = sac.alpha
+    for _ in range(20):
+        sac.update(batch_of(action_dim=3))
+    assert sac.alpha > before
+
+
+def test_the_actors_loss_does_not_train_the_critics():
+    sac, batch = small(), batch_of()
+    s = sac.normalise(batch["obs"])
+    sac.critic(s, sac.actor.sample(s)[0], frozen=True).sum().backward()
+    assert all(p.grad is None for p in sac.critic.parameters())
+    assert any(p.grad.abs().sum() > 0 for p in sac.actor.parameters())
+
+
+def test_the_target_critics_follow_by_tau():
+    sac = small(tau=0.25)
+    old = [p.clone() for p in sac.target.parameters()]
+    sac.update(batch_of())
+    for before, target, critic in zip(old, sac.target.parameters(), sac.critic.parameters(), strict=True):
+        assert torch.allclose(target, 0.75 * before + 0.25 * critic, atol=1e-6)
+
+
+def test_running_normalisation_is_that_of_all_observations():
+    sac, x = small(), np.random.default_rng(0).normal([1, -2, 5], [1, 3, 0.5], (500, 3)).astype(np.float32)
+    for row in x:
+        sac.observe(row)
+    assert sac.obs_mean.numpy() == pytest.approx(x.mean(0), abs=1e-3)
+    assert sac.obs_var.numpy() == pytest.approx(x.var(0), rel=1e-3)
+
+
+# The loop -----------------------------------------------------------------------------------------
+
+
+def test_the_time_limit_is_not_stored_as_the_end(monkeypatch):
+    buffers = []
+    monkeypatch.setattr(module, "ReplayBuffer", lambda *a: buffers.append(ReplayBuffer(*a)) or buffers[-1])
+    train(Walk(), steps=60, seed=0, random_steps=100, width=8)
+    assert len(buffers[0]) == 60 and (buffers[0].data["terminal"] == 0).all()
+
+
+def test_a_full_buffer_forgets_the_oldest():
+    buffer = ReplayBuffer(1, 1, 3)
+    for i in range(5):
+        buffer.add(obs=i, action=0, reward=i, next_obs=i, terminal=0)
+    assert sorted(buffer.data["reward"]) == [2, 3, 4] and len(buffer) == 3
+
+
+def test_a_resumed_run_ends_as_the_uninterrupted_one(tmp_path):
+    recipe = dict(steps=200, seed=3, random_steps=40, width=16, batch=16)
+    whole, log = train(Walk(), **recipe)
+
+    class Cut(Walk):
+        def reset(self, seed=None, options=None):
+            self.episodes = getattr(self, "episodes", 0) + 1
+            if self.episodes == 7:
+                raise Stop
+            return super().reset(seed=seed)
+
+    path = tmp_path / "policy.checkpoint"
+    with pytest.raises(Stop):
+        train(Cut(), checkpoint=Checkpoint(path, seconds=0), **recipe)
+    resumed, log_2 = train(Walk(), checkpoint=Checkpoint(path), **recipe)
+    assert log_2 == log
+    for p, q in zip(whole.actor.parameters(), resumed.actor.parameters(), strict=True):
+        assert torch.equal(p, q)
+
+
+def test_a_saved_agent_acts_as_before(tmp_path):
+    sac, obs = small(), np.array([0.1, -0.2, 0.3], np.float32)
+    sac.observe(obs)
+    sac.update(batch_of())
+    module.save(tmp_path / "agent.safetensors", sac)
+    loaded = module.load(tmp_path / "agent.safetensors")
+    assert (loaded.act(obs, deterministic=True) == sac.act(obs, deterministic=True)).all()
+
+
+def test_success_is_logged_and_teaches_nothing():
+    recipe = dict(steps=100, seed=0, random_steps=40, width=16, batch=16)
+    told_right, log = train(Walk(), **recipe)
+    env = Walk()
+    env.flip_success = True
+    told_wrong, log_2 = train(env, **recipe)
+    assert [r["success"] for r in log] == [not r["success"] for r in log_2]
+    for p, q in zip(told_right.actor.parameters(), told_wrong.actor.parameters(), strict=True):
+        assert torch.equal(p, q)
+
+
+def test_the_log_has_reward_parts_losses_and_evaluations():
+    seen = []
+    _, log = train(Walk(), steps=80, seed=0, random_steps=20, width=8, batch=8,
+                   evaluate=lambda sac: seen.append(sac) or {"test": 1.0}, evaluate_every=2)  # fmt: skip
+    assert {"episode", "step", "return", "r1", "r2", "success", "alpha", "entropy", "critic_loss"} < set(
+        log[-1]
+    )
+    assert [("test" in row) for row in log] == [False, True, False, True] and len(seen) == 2
+
+
+def test_it_learns_to_stand_at_the_right_place():
+    sac, _ = train(Walk(), steps=800, seed=0, random_steps=200, width=32, batch=64, average=0.02)
+    env, ends = Walk(), []
+    for seed in range(10):
+        obs, _ = env.reset(seed=seed)
+        for _ in range(20):
+            obs = env.step(sac.act(obs, deterministic=True))[0]
+        ends.append(obs[0])
+    assert np.abs(np.array(ends) - 0.5).max() < 0.15

@@ -1,0 +1,214 @@
+"""Claims about keypoints, Eq. 6-7, and the detector's known ways to fail."""
+
+import numpy as np
+import pytest
+import torch
+
+from lbw_minimal import transporter as tp
+from lbw_minimal.training import Checkpoint, InputError
+
+
+def squares(T=240, seed=0):
+    """A red and a blue square, 14 pixels wide, on separate smooth paths; true centres (T, 2, 2) in pixels."""
+    rng = np.random.default_rng(seed)
+    phase, t = rng.uniform(0, 2 * np.pi, 4), np.arange(T)
+    # Frequencies without a common divisor: nothing about one square can be read off the other.
+    x_red, y_red = 42 + 26 * np.sin(0.131 * t + phase[0]), 22 + 10 * np.sin(0.171 * t + phase[1])
+    x_blue, y_blue = 42 + 26 * np.sin(0.113 * t + phase[2]), 60 + 10 * np.sin(0.097 * t + phase[3])
+    centres = np.stack([np.stack([x_red, y_red], 1), np.stack([x_blue, y_blue], 1)], 1).round()  # (T, 2, 2)
+    frames = np.full((T, 84, 84, 3), 120, np.uint8)
+    for frame, pair in zip(frames, centres.astype(int), strict=True):
+        for (x, y), colour in zip(pair, [(200, 40, 40), (40, 60, 200)], strict=True):
+            frame[y - 7 : y + 7, x - 7 : x + 7] = colour
+    return frames, centres - 0.5  # the centre of pixels x - 7 .. x + 6
+
+
+@pytest.fixture(scope="module")
+def trained():
+    torch.set_num_threads(1)
+    frames, centres = squares()
+    model, log = tp.train([frames[:180]], iterations=TRAINING, seed=0, K=4)
+    return model, log, tp.detect(model, frames), frames, centres
+
+
+TRAINING = 100  # iterations; a second for every eight
+
+
+def follow(z, centres):
+    """R^2 (K, squares) of each keypoint's own linear map to each square, the worse of x and y."""
+    return np.array([[tp.r2(z[:, [k]], centres[:, s]).min() for s in (0, 1)] for k in range(z.shape[1])])
+
+
+def test_transport_is_equation_6_by_hand():
+    phi_x, phi_y = torch.tensor([[[[2.0, 4.0]]]]), torch.tensor([[[[10.0, 20.0]]]])
+    h_x, h_y = torch.tensor([[[[0.5, 0.0]]]]), torch.tensor([[[[0.25, 1.0]]]])
+    # (1 - 0.5)(1 - 0.25) 2 + 0.25 * 10 = 3.25 and (1 - 0)(1 - 1) 4 + 1 * 20 = 20
+    assert torch.equal(tp.transport(phi_x, phi_y, h_x, h_y), torch.tensor([[[[3.25, 20.0]]]]))
+
+
+def test_nothing_is_learnt_through_the_source():
+    phi_x, phi_y, h_x, h_y = (torch.rand(1, 2, 3, 3, requires_grad=True) for _ in range(4))
+    tp.transport(phi_x, phi_y, h_x, h_y).sum().backward()
+    assert phi_x.grad is None and h_x.grad is None
+    assert phi_y.grad.abs().sum() > 0 and h_y.grad.abs().sum() > 0
+
+
+def test_gaussian_is_1_at_its_keypoint_and_1_over_e_at_one_sigma():
+    sigma = 4 / 21  # two cells
+    h = tp.heat_map(torch.zeros(1, 1, 2), sigma)[0, 0]  # the centre is the middle of cell (10, 10)
+    assert h[10, 10] == pytest.approx(1)
+    assert h[10, 12].item() == pytest.approx(np.exp(-1), abs=1e-5)
+    assert h[8, 10].item() == pytest.approx(np.exp(-1), abs=1e-5)
+
+
+def test_heat_map_has_its_column_from_x_and_its_row_from_y():
+    cell = lambda i: (2 * i + 1) / 21 - 1  # noqa: E731
+    h = tp.heat_map(torch.tensor([[[cell(17), cell(4)]]]))[0, 0]
+    assert divmod(h.argmax().item(), 21) == (4, 17)
+
+
+def test_heat_map_stays_below_1_where_keypoints_meet():
+    h = tp.heat_map(torch.tensor([[[0.0, 0.0], [0.0, 0.0], [0.1, 0.0]]]))
+    assert h.min() >= 0 and h.max() <= 1
+    # Two equal keypoints of height h merge to 1 - (1 - h)^2.
+    one, two = tp.heat_map(torch.zeros(1, 1, 2)), tp.heat_map(torch.zeros(1, 2, 2))
+    assert torch.allclose(two, 1 - (1 - one) ** 2, atol=1e-6)
+
+
+@pytest.mark.parametrize(("row", "column"), [(0, 0), (3, 17), (10, 10), (20, 0), (15, 20)])
+def test_soft_argmax_finds_a_sharp_peak_to_within_a_cell(row, column):
+    logits = torch.zeros(1, 1, 21, 21)
+    logits[0, 0, row, column] = 30.0
+    x, y = tp.soft_argmax(logits)[0, 0].tolist()
+    assert abs(x - ((2 * column + 1) / 21 - 1)) < 2 / 21
+    assert abs(y - ((2 * row + 1) / 21 - 1)) < 2 / 21
+
+
+def test_x_points_right_and_y_points_down():
+    logits = torch.zeros(1, 1, 21, 21)
+    logits[0, 0, 2, 18] = 30.0  # top right
+    x, y = tp.soft_argmax(logits)[0, 0].tolist()
+    assert x > 0.5 and y < -0.5
+
+
+def test_loss_is_equation_7_by_hand():
+    y_hat, y = torch.zeros(1, 3, 1, 2), torch.ones(1, 3, 1, 2)
+    y[..., 1] = 2.0
+    assert tp.loss(y_hat, y) == pytest.approx((1 + 4) / 2)
+    assert tp.loss(y_hat, y, torch.tensor([[[[1.0, 3.0]]]])) == pytest.approx((1 * 1 + 3 * 4) / 2)
+
+
+def test_motion_weight_is_1_on_the_background_and_grows_with_distance():
+    median, y = torch.zeros(1, 3, 1, 2), torch.zeros(1, 3, 1, 2)
+    y[..., 1] = torch.tensor([0.6, 0.0, -0.3])[:, None]  # mean distance 0.3
+    assert tp.motion_weight(y, median).flatten().tolist() == pytest.approx([1, 1 + tp.MOTION * 0.3])
+
+
+def test_pairs_are_near_each_other_or_drawn_freely_and_every_video_is_target_equally_often():
+    source, target = tp._draw_pairs(np.array([1000, 50]), 4000, np.random.default_rng(0))
+    same = (source < 1000) == (target < 1000)
+    near = same & (np.abs(source - target) <= tp.GAP)
+    assert source.min() >= 0 and source.max() < 1050 and target.max() < 1050
+    assert 0.47 < (target < 1000).mean() < 0.53
+    assert 1 - tp.ACROSS < near.mean() < 1 - tp.ACROSS + 0.1  # some free pairs are near by chance
+
+
+def test_some_keypoint_follows_each_moving_square(trained):
+    _, _, z, _, centres = trained
+    assert (follow(z, centres).max(0) > 0.9).all()
+
+
+def test_keypoints_do_not_all_sit_on_one_square(trained):
+    _, _, z, _, centres = trained
+    pixels = (z + 1) * 42 - 0.5
+    inside = np.abs(pixels[:, :, None] - centres[:, None]).max(-1) < 10  # (T, K, squares)
+    assert (inside.mean(0).max(0) > 0.9).all()
+
+
+def test_trained_keypoints_leave_the_centre(trained):
+    _, _, z, _, _ = trained
+    assert (np.abs(z).max((0, 2)) > 0.2).all()
+
+
+def test_log_tells_how_far_each_keypoint_moves(trained):
+    _, log, _, _, _ = trained
+    assert log[-1]["step"] == TRAINING and len(log[-1]["keypoint_std"]) == 4
+    assert min(log[-1]["keypoint_std"]) > 0.1
+
+
+def test_detection_holds_on_noisy_darker_frames(trained):
+    model, _, z, frames, centres = trained
+    noise = np.random.default_rng(0).normal(0, 6, frames.shape)
+    worse = (frames * 0.9 + noise).clip(0, 255).astype(np.uint8)
+    assert (tp.r2(z, centres.reshape(-1, 4), tp.detect(model, worse), centres.reshape(-1, 4)) > 0.8).all()
+
+
+def test_detecting_one_frame_or_many_gives_the_same(trained):
+    model, _, z, frames, _ = trained
+    assert z.dtype == np.float32 and z.shape == (240, 4, 2)
+    assert np.allclose(tp.detect(model, frames[100:101])[0], z[100], atol=1e-4)
+
+
+def test_same_seed_same_model_and_another_seed_another():
+    frames, _ = squares(40)
+    a, b, c = (tp.detect(tp.train([frames], iterations=3, seed=s, K=2)[0], frames[:2]) for s in (0, 0, 1))
+    assert np.array_equal(a, b) and not np.array_equal(a, c)
+
+
+def test_resumed_training_ends_exactly_like_an_unbroken_one(tmp_path):
+    frames, _ = squares(40)
+
+    class Killed(Exception):
+        pass
+
+    class KilledAfterThree(Checkpoint):
+        def save(self, make_state, force=False):
+            super().save(make_state, force=True)
+            if make_state()["step"] == 3:
+                raise Killed
+
+    path = tmp_path / "transporter.ckpt"
+    with pytest.raises(Killed):
+        tp.train([frames], iterations=6, seed=0, K=2, checkpoint=KilledAfterThree(path))
+    resumed, log = tp.train([frames], iterations=6, seed=0, K=2, checkpoint=Checkpoint(path))
+    unbroken, log_unbroken = tp.train([frames], iterations=6, seed=0, K=2)
+    assert log == log_unbroken
+    for a, b in zip(resumed.parameters(), unbroken.parameters(), strict=True):
+        assert torch.equal(a, b)
+
+
+def test_frames_of_another_size_are_refused_in_one_sentence():
+    with pytest.raises(InputError, match="84, 84, 3"):
+        tp.train([np.zeros((5, 64, 64, 3), np.uint8)], iterations=1, seed=0)
+
+
+def test_r2_is_1_for_a_linear_map_with_intercept():
+    z = np.random.default_rng(0).normal(size=(40, 2, 2))
+    true = np.stack([3 * z[:, 0, 0] - z[:, 1, 1] + 40, 7 - 2 * z[:, 0, 1]], 1)
+    assert tp.r2(z, true) == pytest.approx([1, 1])
+    assert tp.pixel_error(z, true) == pytest.approx([0, 0], abs=1e-9)
+
+
+def test_r2_by_hand_on_a_held_out_set():
+    z, true = np.array([[[0.0]], [[1.0]]]), np.array([[0.0], [1.0]])  # the map is the identity
+    z_held, true_held = np.array([[[0.0]], [[2.0]]]), np.array([[0.0], [4.0]])
+    # Predicted 0 and 2, true 0 and 4 with mean 2: 1 - 4 / 8; root of the mean square error, (4 / 2)^0.5.
+    assert tp.r2(z, true, z_held, true_held) == pytest.approx([0.5])
+    assert tp.pixel_error(z, true, z_held, true_held) == pytest.approx([2**0.5])
+
+
+def test_r2_of_noise_is_not_above_0():
+    rng = np.random.default_rng(0)
+    assert (tp.r2(rng.normal(size=(40, 5, 2)), rng.normal(size=(40, 4))) <= 0).all()
+
+
+def test_saved_model_comes_back_with_its_sizes(tmp_path):
+    model, images = tp.Transporter(K=3).eval(), torch.rand(2, 3, 84, 84) * 2 - 1
+    tp.save(tmp_path / "z.safetensors", model, "push")
+    assert torch.equal(tp.load(tmp_path / "z.safetensors").keypoints(images), model.keypoints(images))
+
+
+def test_weights_of_another_task_are_refused(tmp_path):
+    tp.save(tmp_path / "z.safetensors", tp.Transporter(), "reach")
+    with pytest.raises(InputError, match="reach"):
+        tp.load(tmp_path / "z.safetensors", "push")

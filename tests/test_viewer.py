@@ -1,0 +1,310 @@
+"""The meshcat mirror: what the browser is told equals what PyBullet knows, and nothing listens anywhere."""
+
+import base64
+import re
+import socket
+import time
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import numpy as np
+import pybullet as p
+import pybullet_data
+import pytest
+import umsgpack
+
+from tasks.viewer import Recorder, normals, read_mesh, transform
+
+PANDA = Path(pybullet_data.getDataPath()) / "franka_panda" / "panda.urdf"
+
+
+@pytest.fixture
+def client():
+    client = p.connect(p.DIRECT)
+    yield client
+    p.disconnect(client)
+
+
+def low_poly_panda(client, folder):
+    text = PANDA.read_text().replace("meshes/visual", "meshes/collision")
+    (folder / "arm.urdf").write_text(text.replace("package://", f"{PANDA.parent}/"))
+    return p.loadURDF(str(folder / "arm.urdf"), (0.1, 0.2, 0.3), p.getQuaternionFromEuler((0.1, 0.2, 0.3)),
+                      useFixedBase=True, physicsClientId=client)  # fmt: skip
+
+
+def primitives(client):
+    """A base and a hinged link, both with two shapes apart from their centres of mass, all kinds of shape."""
+    p.setGravity(0, 0, -9.81, client)
+    turn = p.getQuaternionFromEuler
+
+    def shapes(kinds, **options):
+        return p.createVisualShapeArray(shapeTypes=kinds, physicsClientId=client, **options)
+
+    base = shapes(
+        [p.GEOM_BOX, p.GEOM_CYLINDER],
+        halfExtents=[[0.1, 0.2, 0.05], [0, 0, 0]], radii=[0, 0.05], lengths=[0, 0.3],
+        visualFramePositions=[[0, 0, 0.1], [0.1, 0.1, 0.2]],
+        visualFrameOrientations=[turn((0, 0, 0.3)), turn((0.5, 0, 0))],
+        rgbaColors=[[1, 0, 0, 1], [0, 1, 0, 0.5]],
+    )  # fmt: skip
+    link = shapes(
+        [p.GEOM_CAPSULE, p.GEOM_SPHERE], radii=[0.04, 0.06], lengths=[0.2, 0],
+        visualFramePositions=[[0.15, 0, 0], [0.3, 0, 0.05]],
+        visualFrameOrientations=[turn((0, np.pi / 2, 0.2)), [0, 0, 0, 1]],
+    )  # fmt: skip
+    return p.createMultiBody(
+        1.0, -1, base, (0.2, 0.1, 0.8), turn((0.2, 0.4, 0.1)), (0.05, 0.02, 0.1), turn((0.3, 0, 0.2)),
+        linkMasses=[0.5], linkCollisionShapeIndices=[-1], linkVisualShapeIndices=[link],
+        linkPositions=[[0.2, 0, 0.1]], linkOrientations=[turn((0, 0.3, 0))],
+        linkInertialFramePositions=[[0.1, 0.03, 0]], linkInertialFrameOrientations=[turn((0, 0.2, 0.7))],
+        linkParentIndices=[0], linkJointTypes=[p.JOINT_REVOLUTE], linkJointAxis=[[0, 1, 0]],
+        physicsClientId=client,
+    )  # fmt: skip
+
+
+def commands(page):
+    """The commands in a page, as its viewer reads them."""
+    line = re.search(r"for \(const command of (\[.*\])\)", page).group(1)
+    numbers = {0x16: "<u4", 0x17: "<f4"}
+    ext = {k: lambda e, t=t: np.frombuffer(e.data, t) for k, t in numbers.items()}
+    return [umsgpack.unpackb(base64.b64decode(c), ext_handlers=ext) for c in re.findall(r"'([^']+)'", line)]
+
+
+def played(page, frame):
+    """What the browser draws at a frame: a list of path, three.js geometry, 4x4 world pose, material."""
+    told = commands(page)
+    fixed = {c["path"]: np.reshape(c["matrix"], (4, 4)).T for c in told if c["type"] == "set_transform"}
+    for c in told:
+        for part in c.get("animations", []):
+            at = {t["name"]: t["keys"][frame]["value"] for t in part["clip"]["tracks"]}
+            fixed[part["path"]] = transform(at[".position"], at[".quaternion"])
+    return [
+        (c["path"], c["object"]["geometries"][0], fixed[c["path"].rsplit("/", 1)[0]] @ fixed[c["path"]],
+         c["object"]["materials"][0])
+        for c in told if c["type"] == "set_object"
+    ]  # fmt: skip
+
+
+def depth(client):
+    """What a camera at the scene's side sees, distances (320, 320) in m, from TinyRenderer."""
+    view = p.computeViewMatrix((0.6, -1.8, 1.2), (0.3, 0.1, 0.75), (0, 0, 1))
+    near, far = 0.5, 5.0
+    lens = p.computeProjectionMatrixFOV(32, 1, near, far)
+    z = p.getCameraImage(320, 320, view, lens, renderer=p.ER_TINY_RENDERER, physicsClientId=client)[3]
+    return far * near / (far - (far - near) * np.reshape(z, (320, 320)))
+
+
+def redrawn(page, frame):
+    """The same picture of an empty PyBullet world in which only the page's shapes stand."""
+    client = p.connect(p.DIRECT)
+    for _, shape, pose, _ in played(page, frame):
+        kind = shape["type"]
+        if kind == "BoxGeometry":
+            half = [shape["width"] / 2, shape["height"] / 2, shape["depth"] / 2]
+            options = {"shapeType": p.GEOM_BOX, "halfExtents": half}
+        elif kind == "SphereGeometry":
+            options = {"shapeType": p.GEOM_SPHERE, "radius": shape["radius"]}
+        elif kind == "CylinderGeometry":
+            options = {"shapeType": p.GEOM_CYLINDER, "radius": shape["radiusTop"], "length": shape["height"]}
+            pose = pose @ transform(
+                (0, 0, 0), p.getQuaternionFromEuler((-np.pi / 2, 0, 0))
+            )  # z along their y
+        else:
+            corners = shape["data"]["attributes"]["position"]["array"].reshape(-1, 3)
+            options = {"shapeType": p.GEOM_MESH, "vertices": corners.tolist(),
+                       "indices": list(range(len(corners)))}  # fmt: skip
+        visual = p.createVisualShape(physicsClientId=client, **options)
+        w = quaternion(pose[:3, :3])
+        p.createMultiBody(0, -1, visual, pose[:3, 3].tolist(), w, physicsClientId=client)
+    picture = depth(client)
+    p.disconnect(client)
+    return picture
+
+
+def assert_same_picture(a, b):
+    seen = (a < 4) | (b < 4)
+    assert seen.sum() > 8000  # of 102,400 pixels
+    off = abs(a - b)[seen] > 1e-3  # m
+    assert off.mean() < 0.045  # TinyRenderer cuts the ends of capsules; a capsule too long is at 0.065
+
+
+def quaternion(R):
+    """(x, y, z, w) of a rotation matrix: the eigenvector of R that is its axis, and its angle."""
+    values, vectors = np.linalg.eig(R)
+    axis = np.real(vectors[:, np.argmin(abs(values - 1))])
+    v = np.cross(axis, [1.0, 0, 0] if abs(axis[0]) < 0.9 else [0, 1.0, 0])
+    angle = np.arctan2(axis @ np.cross(v, R @ v), v @ R @ v)
+    return [*(np.sin(angle / 2) * axis), np.cos(angle / 2)]
+
+
+def shake(client, body, rng):
+    for j in range(p.getNumJoints(body, client)):
+        p.resetJointState(body, j, rng.uniform(-0.4, 0.4), physicsClientId=client)
+
+
+def test_primitives_look_in_the_browser_as_in_pybullet(client):
+    """Depths seen by one camera: rules out swapped axes, sizes, and forgotten inertial offsets at once."""
+    body = primitives(client)
+    shake(client, body, np.random.default_rng(0))
+    recorder = Recorder(client)
+    recorder.snap()
+    assert_same_picture(depth(client), redrawn(recorder.html("x"), 0))
+
+
+def test_the_panda_looks_in_the_browser_as_in_pybullet(client, tmp_path):
+    body = low_poly_panda(client, tmp_path)
+    shake(client, body, np.random.default_rng(1))
+    recorder = Recorder(client)
+    recorder.snap()
+    assert_same_picture(depth(client), redrawn(recorder.html("x"), 0))
+
+
+def test_links_stand_where_the_urdf_puts_them(client, tmp_path):
+    """Forward kinematics of the URDF, multiplied out by hand, in ten random states, to a micrometre."""
+    body = low_poly_panda(client, tmp_path)
+    recorder, rng, wanted = Recorder(client), np.random.default_rng(2), []
+    base = transform((0.1, 0.2, 0.3), p.getQuaternionFromEuler((0.1, 0.2, 0.3)))
+    joints = ET.parse(tmp_path / "arm.urdf").getroot().findall("joint")
+    number = {p.getJointInfo(body, j, client)[1].decode(): j for j in range(p.getNumJoints(body, client))}
+    for _ in range(10):
+        shake(client, body, rng)
+        recorder.snap()
+        world = {"panda_link0": base}
+        for joint in joints:  # the file lists parents first
+            link, origin = number[joint.get("name")], joint.find("origin")
+            xyz, rpy = ([float(v) for v in origin.get(k).split()] for k in ("xyz", "rpy"))
+            T = world[joint.find("parent").get("link")] @ transform(xyz, p.getQuaternionFromEuler(rpy))
+            if joint.get("type") != "fixed":
+                axis = np.array([float(v) for v in joint.find("axis").get("xyz").split()])
+                q = p.getJointState(body, link, client)[0]
+                turns = joint.get("type") == "revolute"
+                T = T @ (transform((0, 0, 0), p.getQuaternionFromAxisAngle(axis, q)) if turns
+                         else transform(axis * q, (0, 0, 0, 1)))  # fmt: skip
+            world[joint.find("child").get("link")] = T
+        wanted.append({number[j.get("name")]: world[j.find("child").get("link")] for j in joints})
+    page = recorder.html("x")
+    flip = np.diag([-1, -1, 1, 1])  # the right finger's mesh is the left one's, turned by half about z
+    for i in range(10):
+        for path, _, pose, _ in played(page, i):
+            link = int(path.split("/")[3])
+            T = base if link < 0 else wanted[i][link]
+            np.testing.assert_allclose(pose, T @ flip if link == 10 else T, atol=1e-6)
+
+
+def test_a_falling_body_is_drawn_at_its_frame_not_at_its_centre_of_mass(client):
+    """A point of the body, known in the frame of its shapes, followed through a tumbling fall."""
+    body = primitives(client)
+    recorder = Recorder(client)
+    p.resetBaseVelocity(body, (0.3, 0, 1), (1, 2, 3), client)
+    inertial = transform((0.05, 0.02, 0.1), p.getQuaternionFromEuler((0.3, 0, 0.2)))
+    wanted = []
+    for _ in range(20):
+        p.stepSimulation(client)
+        recorder.snap()
+        mass = transform(*p.getBasePositionAndOrientation(body, client))
+        wanted.append(mass @ np.linalg.inv(inertial) @ (0, 0, 0.1, 1))  # the box's centre
+    page = recorder.html("x")
+    centres = [played(page, i)[0][2][:3, 3] for i in range(20)]
+    np.testing.assert_allclose(centres, np.array(wanted)[:, :3], atol=1e-6)
+
+
+def test_every_shape_keeps_its_colour(client):
+    primitives(client)
+    paint = [material for *_, material in played(Recorder(client).html("x"), 0)]
+    assert [m["color"] for m in paint[:2]] == [0xFF0000, 0x00FF00]
+    assert [(m["opacity"], m["transparent"]) for m in paint[:2]] == [(1, False), (0.5, True)]
+
+
+def test_nothing_listens_and_nothing_is_started(client, monkeypatch):
+    def refuse(*args, **kwargs):
+        raise AssertionError("a socket or a process")
+
+    for name in ("bind", "listen", "connect"):
+        monkeypatch.setattr(socket.socket, name, refuse)
+    monkeypatch.setattr("subprocess.Popen.__init__", refuse)
+    monkeypatch.setattr("zmq.Context.socket", refuse)
+    primitives(client)
+    assert "MeshCat.Viewer" in Recorder(client).html("x")
+
+
+def test_the_page_needs_nothing_else_and_stays_small(client, tmp_path):
+    body = low_poly_panda(client, tmp_path)
+    recorder, rng = Recorder(client), np.random.default_rng(3)
+    for _ in range(300):  # the longest horizon of the tasks
+        shake(client, body, rng)
+        recorder.snap()
+    page = recorder.html("a <b> & c")
+    assert len(page) < 2e6
+    assert not re.search(r"<(?:script|link|img|iframe)[^>]*\b(?:src|href)=", page)
+    assert "<title>a &lt;b&gt; &amp; c</title>" in page
+    assert str(tmp_path) not in page and "pybullet_data" not in page
+
+
+def test_the_animation_repeats_for_ever_at_the_frame_rate_asked_for(client):
+    body = primitives(client)
+    recorder = Recorder(client)
+    for x in range(3):
+        p.resetBasePositionAndOrientation(body, (x, 0, 0), (0, 0, 0, 1), client)
+        recorder.snap()
+    (animation,) = [c for c in commands(recorder.html("x", fps=10)) if c["type"] == "set_animation"]
+    assert animation["options"] == {"play": True, "repetitions": float("inf")}
+    clip = animation["animations"][0]["clip"]
+    # three frames, then a second's rest
+    assert clip["fps"] == 10 and [k["time"] for k in clip["tracks"][0]["keys"]] == [0, 1, 2, 12]
+
+
+def test_only_the_bodies_asked_for_are_recorded(client):
+    first, second = primitives(client), primitives(client)
+    assert {body for body, _ in Recorder(client, [second]).links} == {second} != {first}
+
+
+def test_what_does_not_move_is_not_animated(client):
+    primitives(client)
+    recorder = Recorder(client)
+    recorder.snap()
+    recorder.snap()
+    assert "set_animation" not in [c["type"] for c in commands(recorder.html("x"))]
+
+
+def test_a_snap_costs_little(client, tmp_path):
+    low_poly_panda(client, tmp_path)
+    recorder = Recorder(client)
+    start = time.perf_counter()
+    for _ in range(50):
+        recorder.snap()
+    assert (time.perf_counter() - start) / 50 < 0.01  # s; a control step takes 0.04
+
+
+def test_a_pages_ids_tell_nothing_of_the_computer(client):
+    """meshcat's own are uuid1, which holds the network address."""
+    primitives(client)
+    page = Recorder(client).html("x")
+    assert page == Recorder(client).html("x")
+
+
+def test_stl_and_obj_give_the_same_triangles(tmp_path):
+    corners = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 0, 0], [0, 1, 0], [-1, 0, 0]]], "<f4")
+    (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv -1 0 0\nf 1 2/1 3//1 -1\n")
+    rows = b"".join(b"\0" * 12 + c.tobytes() + b"\0\0" for c in corners)
+    (tmp_path / "a.stl").write_bytes(b" " * 80 + np.uint32(2).tobytes() + rows)
+    np.testing.assert_array_equal(read_mesh(tmp_path / "a.stl"), corners)
+    np.testing.assert_array_equal(read_mesh(tmp_path / "a.obj"), corners)
+
+
+@pytest.mark.parametrize(
+    ("name", "data"), [("a.dae", b"<x/>"), ("a.stl", b"solid a\nendsolid"), ("b.stl", b"")]
+)
+def test_a_mesh_it_cannot_read_is_named(tmp_path, name, data):
+    (tmp_path / name).write_bytes(data)
+    with pytest.raises(ValueError, match=name):
+        read_mesh(tmp_path / name)
+
+
+def test_edges_are_shaded_sharp_and_round_surfaces_round():
+    a = np.radians(20)  # two squares' halves that meet along y: bent by 20 degrees, then by 90
+    for bend, same in ((a, True), (np.pi / 2, False)):
+        left = [[-1, 0, 0], [0, 0, 0], [0, 1, 0]]
+        right = [[0, 1, 0], [0, 0, 0], [np.cos(bend), 0, np.sin(bend)]]
+        n = normals(np.array([left, right], float))
+        assert np.allclose(n[0, 1], n[1, 1]) == same
+    np.testing.assert_allclose(n[0], [[0, 0, 1]] * 3, atol=1e-12)

@@ -1,0 +1,149 @@
+"""The wrappers: what Gymnasium asks of them, and that only frames reach observation and reward."""
+
+import warnings
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from toy_push import ToyPush, demonstration, detect, random_frames
+
+from lbw_minimal.reward import KeypointReward
+from lbw_minimal.sac import train
+from lbw_minimal.wrappers import KeypointObservation, KeypointRewardWrapper
+
+K = 4
+
+
+@pytest.fixture(scope="module", params=["mended", "literal"])
+def reward(request):
+    return KeypointReward(detect(demonstration()), detect(random_frames(300)), horizon=50, form=request.param)
+
+
+def wrap(env, reward):
+    return KeypointRewardWrapper(KeypointObservation(env, detect), reward)
+
+
+class Film(gym.Env):
+    """Plays given frames, whatever one does. The world behind them is closed: reading it raises."""
+
+    observation_space = gym.spaces.Box(0, 255, (84, 84, 3), np.uint8)
+    action_space = gym.spaces.Box(-1, 1, (3,), np.float32)
+
+    class Info(dict):
+        def _closed(self, *_):
+            raise AssertionError("the simulator's state was read")
+
+        __getitem__ = get = items = values = _closed
+
+    def __init__(self, frames, reward=0.0):
+        self.frames, self.own_reward, self.t = frames, reward, 0
+
+    def __getattr__(self, name):
+        if name in ("puck", "position", "parts", "state", "is_success", "unwrapped_state"):
+            raise AssertionError(f"the simulator's state was read: {name}")
+        raise AttributeError(name)
+
+    def reset(self, seed=None, options=None):
+        self.t = 0
+        return self.frames[0], self.Info(object=[1.0, 2.0])
+
+    def step(self, action):
+        self.t += 1
+        return self.frames[self.t], self.own_reward, False, False, self.Info(is_success=True)
+
+
+def play(env, steps=20):
+    """Observations (steps + 1, S) and rewards (steps,) of an episode under actions that do not matter."""
+    observations, rewards = [env.reset(seed=0)[0]], []
+    for _ in range(steps):
+        observation, r, *_ = env.step(np.zeros(3, np.float32))
+        observations.append(observation)
+        rewards.append(r)
+    return np.array(observations), np.array(rewards)
+
+
+def test_gymnasium_has_nothing_to_complain_about(reward):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warnings.filterwarnings(
+            "ignore", "(?s).*is different from the unwrapped version"
+        )  # they are wrappers
+        check_env(wrap(ToyPush(), reward), skip_render_check=True)
+        check_env(KeypointObservation(ToyPush(), detect), skip_render_check=True)
+
+
+def test_observation_is_x_y_of_one_keypoint_after_the_other():
+    z, _ = KeypointObservation(ToyPush(), detect).reset(seed=0)
+    assert z.dtype == np.float32 and (z.reshape(K, 2) == detect(ToyPush().reset(seed=0)[0][None])[0]).all()
+
+
+def test_a_keypoint_off_the_image_is_put_on_its_edge():
+    env = KeypointObservation(ToyPush(), lambda frames: np.full((len(frames), K, 2), 1.5))
+    assert (env.reset()[0] == 1).all()
+
+
+def test_the_wrapper_pays_what_the_reward_says_of_the_two_frames(reward):
+    frames = demonstration()
+    _, paid = play(wrap(Film(frames), reward))
+    z = detect(frames)
+    assert paid.tolist() == pytest.approx([reward(z[t], z[t + 1], t)[0] for t in range(20)], abs=1e-5)
+
+
+def test_observation_and_reward_are_functions_of_the_frames(reward):
+    """Another world with the same pictures, closed to inspection and paying 1,000 a step: no difference."""
+    frames = demonstration()
+    poor, rich = play(wrap(Film(frames), reward)), play(wrap(Film(frames, reward=1000.0), reward))
+    assert (poor[0] == rich[0]).all() and (poor[1] == rich[1]).all()
+
+
+def test_a_difference_in_the_frames_changes_observation_and_reward(reward):
+    frames = demonstration()
+    puckless = np.where(frames == 240, 0, frames)
+    one, other = (play(wrap(Film(f), reward)) for f in (frames, puckless))
+    assert not (one[0] == other[0]).all() and not (one[1] == other[1]).all()
+
+
+def test_literal_policy_sees_keypoints_alone(reward):
+    size = wrap(ToyPush(), reward).observation_space.shape
+    assert size == ((4 * K + 1,) if reward.timed else (2 * K,))
+
+
+def test_timed_observation_tells_the_way_to_the_demonstration_and_the_clock():
+    reward = KeypointReward(detect(demonstration()), detect(random_frames(300)), horizon=50)
+    env = wrap(Film(demonstration()), reward)
+    observations, _ = play(env, 3)
+    z, way, clock = np.split(observations[2], [2 * K, 4 * K])
+    assert (z + way).reshape(K, 2) == pytest.approx(reward.z_E[3], abs=1e-6)
+    assert clock[0] == pytest.approx(2 / (len(reward) - 1))
+
+
+def test_the_clock_starts_again_with_every_episode():
+    reward = KeypointReward(detect(demonstration()), detect(random_frames(300)), horizon=50)
+    env = wrap(ToyPush(), reward)
+    first, second = play(env)[1], play(env)[1]
+    assert (first == second).all()
+
+
+def test_reward_parts_are_told_beside_the_environments_own_info(reward):
+    env = wrap(ToyPush(), reward)
+    env.reset(seed=0)
+    _, r, _, _, info = env.step(np.zeros(3, np.float32))
+    assert (
+        r == pytest.approx(info["reward_parts"]["r1"] + info["reward_parts"]["r2"]) and "is_success" in info
+    )
+
+
+def test_our_agent_trains_on_it(reward):
+    _, log = train(wrap(ToyPush(), reward), steps=100, seed=0, random_steps=50, width=8, batch=8)
+    assert np.isfinite(log[-1]["critic_loss"]) and log[-1]["r1"] < 0
+
+
+def test_stable_baselines_trains_on_it(reward):
+    """Any agent that speaks Gymnasium can train on the kit; this one from outside."""
+    sb3 = pytest.importorskip("stable_baselines3")
+    env = wrap(gym.wrappers.TimeLimit(ToyPush(), 50), reward)
+    agent = sb3.SAC("MlpPolicy", env, learning_starts=50, policy_kwargs={"net_arch": [16, 16]}, seed=0)
+    agent.learn(100)
+    action, _ = agent.predict(env.reset(seed=0)[0], deterministic=True)
+    assert env.action_space.contains(action)
