@@ -28,11 +28,11 @@ class Recipe:
 
     human_frames: int  # frames the translation sees: the demonstration and random motion (Table I)
     robot_frames: int  # frames of random robot motion (Table I)
-    munit_iterations: int = 800
+    munit_iterations: int = 1200
     munit_width: int = 20  # channels of the first layer
-    transporter_iterations: int = 400
+    transporter_iterations: int = 600
     K: int = 5  # keypoints
-    policy_steps: int = 8_000  # environment steps of SAC
+    policy_steps: int = 6_000  # environment steps of SAC
 
 
 @dataclass
@@ -88,7 +88,7 @@ def load_perception(folder: Path, task: str) -> Perception:
     return Perception(translator, style, detector)
 
 
-def learn_perception(demo, random, robot, recipe: Recipe, *, task, seed, run: Run, device="cpu") -> Perception:
+def learn_perception(demo, random, robot, recipe, *, task, seed, run, device="cpu") -> Perception:
     """Train T and Psi from human frames (demonstration and random motion) and random robot frames."""
     human = np.concatenate([demo, random])
     path = run.out / "translation.safetensors"
@@ -120,7 +120,7 @@ def imitate(env, demo, robot, perception: Perception, recipe: Recipe, *, seed, r
 
     demo (N, 84, 84, 3) uint8: the human video. robot (M, 84, 84, 3) uint8: random robot motion.
     form: "literal" for Eq. 8-10 as written, "mended" for what `reward.py` adds.
-    Returns the agent, the reward, and `env` wrapped so that its observations are the policy's.
+    Returns the agent and `env` wrapped so that its observations are the policy's.
     """
     perception.translated = perception.translate(demo)  # v_1^E .. v_N^E
     perception.z_E = perception.detect(perception.translated)  # z_1^E .. z_N^E, (N, K, 2)
@@ -135,4 +135,4 @@ def imitate(env, demo, robot, perception: Perception, recipe: Recipe, *, seed, r
             agent, log = sac.train(env, steps=recipe.policy_steps, seed=seed, checkpoint=checkpoint)
             run.log("policy_log", log)
             sac.save(path, agent)
-    return agent, reward, env
+    return agent, env

@@ -197,7 +197,7 @@ pre { white-space: pre-wrap; background: #f2f4f7; border-radius: 8px; padding: .
 """
 
 INTRODUCTION = """
-<p>A human arm did the task once, in front of a camera. From that video a robot learnt to do it:</p>
+<p>A human arm did the task once, in front of a camera. From that video a robot is to learn it:</p>
 <ol>
 <li>A first network <b>translates</b> the video: it repaints the human arm as the robot's.</li>
 <li>A second one finds <b>keypoints</b> on the translated video: a few spots that follow arm and object.
@@ -380,7 +380,8 @@ def flat(tree, name: str = "") -> list[tuple[str, str]]:
     """Nested figures as rows of name and value."""
     if isinstance(tree, dict):
         return [row for key, value in tree.items() for row in flat(value, f"{name} {key}".strip())]
-    return [(name, str(tree))]
+    values = tree if isinstance(tree, list) else [tree]
+    return [(name, ", ".join(f"{v:.3g}" if isinstance(v, float) else str(v) for v in values))]
 
 
 def duration(seconds: float) -> str:

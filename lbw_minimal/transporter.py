@@ -26,7 +26,10 @@ from lbw_minimal.training import (
 )
 
 SIGMA = 0.1  # width of a keypoint's Gaussian in units of z: one cell of the 21 x 21 map
-SIGMA_START = 0.3  # a keypoint must first feel the object from afar: at 0.1 the arm takes all of them
+SIGMA_START = 0.4  # a keypoint must first feel the object from afar: at 0.1 the arm takes all of them
+SPREAD = (
+    0.3  # weight of `crowding`, falls to 0 with the wide Gaussians; at 0 one thing may take all keypoints
+)
 GAIN = 10.0  # marginal means are small; without a gain the soft-argmax starts, and stays, near the centre
 GAP = 20  # frames between the two of a pair; further apart is as good as drawn freely
 ACROSS = 0.5  # share of pairs drawn freely: within GAP frames the object has moved in only 4 of 10 pairs
@@ -91,6 +94,13 @@ def loss(y_hat: torch.Tensor, y: torch.Tensor, weight: torch.Tensor | float = 1.
     return (weight * (y_hat - y) ** 2).mean()
 
 
+def crowding(z: torch.Tensor, sigma: float) -> torch.Tensor:
+    """Mean overlap in [0, 1) of the Gaussians of different keypoints z (B, K, 2). Not in the paper."""
+    d2 = ((z[:, :, None] - z[:, None]) ** 2).sum(-1)  # (B, K, K)
+    K = z.shape[1]
+    return (torch.exp(-d2 / (2 * sigma**2)).sum((1, 2)) - K).mean() / K**2  # less the K with themselves
+
+
 class Transporter(nn.Module):
     """Feature encoder Phi, keypoint detector Psi and refiner R for frames (B, 3, 84, 84) in [-1, 1]."""
 
@@ -111,11 +121,11 @@ class Transporter(nn.Module):
         return soft_argmax(self.psi(images))
 
     def forward(self, x, y, y_seen=None, sigma: float = SIGMA):
-        """y rebuilt from x, (B, 3, 84, 84); `y_seen` is what the detector sees of y, by default y itself."""
+        """y rebuilt from x, (B, 3, 84, 84), and y's z (B, K, 2); `y_seen` is what the detector sees of y."""
         with torch.no_grad():  # `transport` would stop the gradient anyway; this also saves its cost
             phi_x, h_x = self.phi(x), heat_map(self.keypoints(x), sigma)
-        h_y = heat_map(self.keypoints(y if y_seen is None else y_seen), sigma)
-        return self.refiner(transport(phi_x, self.phi(y), h_x, h_y))
+        z_y = self.keypoints(y if y_seen is None else y_seen)
+        return self.refiner(transport(phi_x, self.phi(y), h_x, heat_map(z_y, sigma))), z_y
 
 
 def _to_network(frames):
@@ -186,21 +196,22 @@ def train(
     bar = progress(iterations, "Transporter", step)
     while step < iterations:
         done = step / iterations
-        sigma = SIGMA + (SIGMA_START - SIGMA) * max(0.0, 1 - 2 * done)
+        early = max(0.0, 1 - 2 * done)  # 1 at the start, 0 from half-way on
+        sigma = SIGMA + (SIGMA_START - SIGMA) * early
         warm_up = min(1.0, (step + 1) / 20)
         optimizer.param_groups[0]["lr"] = LEARNING_RATE * warm_up * (1 + np.cos(np.pi * done)) / 2
         i_x, i_y = (torch.from_numpy(i).to(device) for i in _draw_pairs(lengths, BATCH, rng))
         x, y = _to_network(frames[i_x]), _to_network(frames[i_y])
-        error = loss(model(x, y, _augment(y), sigma), y, motion_weight(y, median))
+        y_hat, z_y = model(x, y, _augment(y), sigma)
+        error = loss(y_hat, y, motion_weight(y, median))
         optimizer.zero_grad()
-        error.backward()
+        (error + SPREAD * early * crowding(z_y, sigma)).backward()
         nn.utils.clip_grad_norm_(model.parameters(), 1.0)
         optimizer.step()
         step += 1
         bar.update()
         if step % 50 == 0 or step == iterations:
-            with torch.no_grad():
-                spread = model.keypoints(y).std(0).mean(-1)  # (K,)
+            spread = z_y.detach().std(0).mean(-1)  # (K,)
             log.append({"step": step, "loss": error.item(), "keypoint_std": spread.tolist()})
         checkpoint.save(state, force=step == iterations)
     bar.close()

@@ -1,8 +1,8 @@
 """The command line: `python -m tasks push` runs the paper on one task.
 
-    python -m tasks TASK      learn TASK from its human video, evaluate, write runs/TASK/report.html
-    python -m tasks record T  film the human videos of task T again
-    python -m tasks bench     steps, iterations and updates a second on this machine
+python -m tasks TASK      learn TASK from its human video, evaluate, write runs/TASK/report.html
+python -m tasks record T  film the human videos of task T again
+python -m tasks bench     steps, iterations and updates a second on this machine
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import json
 import os
 import platform
 import resource
+import shlex
 import shutil
 import sys
 import time
@@ -28,7 +29,7 @@ import tasks
 from lbw_minimal import sac, video
 from lbw_minimal.imitate import Run, imitate, learn_perception, load_perception
 from lbw_minimal.report import wilson, write_report
-from lbw_minimal.training import InputError, pick_device, seed_everything
+from lbw_minimal.training import InputError, pick_device, seed_everything, write_atomic
 from tasks.probe import probe
 from tasks.viewer import Recorder
 from tasks.world import record_expert, record_random
@@ -42,7 +43,9 @@ TEST_EPISODES = 10  # as in the paper
 JITTER = 0.005  # m, start jitter, so that ten test episodes are ten episodes
 TEST_SEED = 1_000_000  # first seed of the test episodes, far from those of training
 PROBE_SEED = 2_000_000
-FAST = dict(munit_iterations=20, munit_width=8, transporter_iterations=30, policy_steps=1500, robot_frames=200)
+RESULTS = ("*.checkpoint", "*.safetensors", "*_log.json", "metrics.json", "report.html")
+FAST = {"munit_iterations": 20, "munit_width": 8, "transporter_iterations": 30, "policy_steps": 1000,
+        "robot_frames": 200}  # fmt: skip
 
 
 def parse(argv):
@@ -60,7 +63,9 @@ def parse(argv):
     parser.add_argument("--evaluate", action="store_true", help="only replay the shipped policy")
     parser.add_argument("--resume", action="store_true", help="go on with the run in --out")
     parser.add_argument("--fast", action="store_true", help="a smoke run through every stage")
-    return parser.parse_args(argv)
+    args = parser.parse_args(argv)
+    args.given = sys.argv[1:] if argv is None else argv
+    return args
 
 
 def task_module(name):
@@ -135,9 +140,7 @@ def run(args):
             here.metrics["perception"] = probe(task_id(name), perception, PROBE_SEED + args.seed)
             here.save()
     env = gym.make(task_id(name), jitter=JITTER)
-    agent, reward, env = imitate(
-        env, demo, robot, perception, recipe, seed=args.seed, run=here, form=args.reward
-    )
+    agent, env = imitate(env, demo, robot, perception, recipe, seed=args.seed, run=here, form=args.reward)
 
     episodes, first, scene = evaluate(agent, env, 2 if args.fast else TEST_EPISODES)
     here.metrics["episodes"] = episodes
@@ -150,7 +153,8 @@ def run(args):
     log = json.loads(log.read_text()) if log.exists() else []  # a replayed policy brings none
     write_report(out / "report.html", task=name, demo=demo, translated=perception.translated,
                  z_demo=perception.z_E, log=log,
-                 episode=first, metrics=here.metrics, scene_html=scene)  # fmt: skip
+                 episode=first, metrics=here.metrics, scene_html=scene,
+                 command="python -m tasks " + shlex.join(args.given))  # fmt: skip
     print(f"{name}: {wins}/{n} successes (95% CI {low:.2f}-{high:.2f})")
     print(f"report: {out / 'report.html'}")
 
@@ -162,13 +166,14 @@ def prepare_folder(out, settings, resume):
         if not note.exists():
             raise InputError(f"{out}: there is no run to resume here; start it without --resume.")
         if json.loads(note.read_text()) != settings:
-            raise InputError(f"{out}: its run had other settings ({note.name}); give those, or another --out.")
+            raise InputError(f"{out}: that run had other settings; give those, or another --out.")
         return out
-    if note.exists():  # an older run of ours, and nobody else's folder, makes room
-        shutil.rmtree(out)
     try:
         out.mkdir(parents=True, exist_ok=True)
-        note.write_text(json.dumps(settings))
+        for pattern in RESULTS if note.exists() else ():  # an older run makes room
+            for file in out.glob(pattern):
+                file.unlink()
+        write_atomic(note, json.dumps(settings))
     except OSError as error:
         raise InputError(f"{out}: cannot write there ({error.strerror}); give another --out.") from None
     return out
@@ -185,6 +190,8 @@ def evaluate(agent, env, n):
         base = env.unwrapped
         recorder = Recorder(base.world.p._client) if i == 0 else None
         film, zs, parts, done, hits = [], [z], [], False, []
+        if recorder:
+            recorder.snap()
         while not done:
             z, _, terminated, truncated, info = env.step(agent.act(z, deterministic=True))
             done = terminated or truncated
@@ -206,6 +213,8 @@ def main(argv=None):
     args = parse(argv)
     try:
         if args.what == "record":
+            if args.task is None:
+                raise InputError(f"record: name the task to film; one of {', '.join(tasks.TASKS)}.")
             record(args.task)
         elif args.what == "bench":
             import_module("tasks.bench").main()

@@ -53,6 +53,7 @@ def panda() -> ArmSpec:
                             f'<origin rpy="0 0 0" xyz="0 {side * 0.015} 0.0584"/>', 1)  # fmt: skip
     # pybullet_data puts the grasp target 7 mm above the fingers' end; ours is where they touch.
     urdf = urdf.replace('xyz="0 0 0.105"', 'xyz="0 0 0.112"')
+    parts = [*(f"link{i}" for i in range(8)), "hand", "leftfinger", "rightfinger"]
     return ArmSpec(
         urdf=urdf,
         base=(0.0, 0.0, 0.0),
@@ -61,8 +62,7 @@ def panda() -> ArmSpec:
         effort=(87, 87, 87, 87, 12, 12, 12),
         reach_links=("panda_hand", "panda_leftfinger", "panda_rightfinger"),
         # One colour: patches of an arm in two tones tempt the translation to paint them anywhere.
-        colours={name: WHITE for name in (*(f"panda_link{i}" for i in range(8)), "panda_hand",
-                                          "panda_leftfinger", "panda_rightfinger")},  # fmt: skip
+        colours={f"panda_{name}": WHITE for name in parts},
     )
 
 
@@ -110,8 +110,8 @@ def human() -> ArmSpec:
 
     def joint(name, parent, child, x, axis=None):
         kind = "fixed" if axis is None else "revolute"
-        turn = "" if axis is None else (f'<axis xyz="{axis}"/>'
-                                        '<limit lower="-2.9" upper="2.9" effort="90" velocity="20"/>')  # fmt: skip
+        limit = '<limit lower="-2.9" upper="2.9" effort="90" velocity="20"/>'
+        turn = "" if axis is None else f'<axis xyz="{axis}"/>{limit}'
         return (f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
                 f'<origin xyz="{x} 0 0"/>{turn}</joint>')  # fmt: skip
 
@@ -120,7 +120,10 @@ def human() -> ArmSpec:
     forearm = [shape("mesh", ("forearm.obj",), (0, 0, 0))]
     # The hand points down like a gripper: its x axis along the fingers, y across, z forward. Knuckles
     # bent, fingertips together under the wrist, as one holds a pen.
-    palm = [shape("box", (0.085, 0.085, 0.045), (0.045, 0, 0)), shape("box", (0.05, 0.08, 0.058), (0.095, 0, 0))]
+    palm = [
+        shape("box", (0.085, 0.085, 0.045), (0.045, 0, 0)),
+        shape("box", (0.05, 0.08, 0.058), (0.095, 0, 0)),
+    ]
     fingers = [
         shape("box", (length, 0.019, 0.023), (0.115 + length / 2, y, 0))
         for y, length in ((-0.033, 0.062), (-0.011, 0.075), (0.011, 0.072), (0.033, 0.055))
@@ -276,6 +279,4 @@ class Arm:
         """Send the torques for the next simulation step; Bullet forgets them after each."""
         q, dq = self.state()
         tau = np.clip(self._bias - self._Kq @ q - self._Kd @ dq, -self.effort, self.effort)
-        self.p.setJointMotorControlArray(
-            self.body, self.joints, self.p.TORQUE_CONTROL, forces=tau.tolist()
-        )
+        self.p.setJointMotorControlArray(self.body, self.joints, self.p.TORQUE_CONTROL, forces=tau.tolist())

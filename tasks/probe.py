@@ -11,7 +11,7 @@ import gymnasium as gym
 import numpy as np
 
 from lbw_minimal.transporter import r2
-from tasks.world import record_expert, record_random
+from tasks.world import record_random
 
 NAMES = ("tip_x", "tip_y", "object_x", "object_y")
 

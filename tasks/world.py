@@ -109,7 +109,7 @@ class World:
             renderer=self.p.ER_TINY_RENDERER, flags=self.p.ER_NO_SEGMENTATION_MASK,
         )  # fmt: skip
         rgb = np.asarray(rgba, np.uint8).reshape(size, size, 4)[..., :3]
-        empty = np.asarray(depth).reshape(size, size, 1)  > 0.999
+        empty = np.asarray(depth).reshape(size, size, 1) > 0.999
         return cv2.resize(np.where(empty, self.wall, rgb), (SIZE, SIZE), interpolation=cv2.INTER_AREA)
 
     def pixel(self, point) -> np.ndarray:
@@ -238,7 +238,8 @@ class TaskEnv(gym.Env):
 
     def true_pixels(self) -> np.ndarray:
         """(4,): the tip's and the object's place in the image, in pixels; for plots and tests only."""
-        return np.concatenate([self.world.pixel(self.arm.tip_pose()[0]), self.world.pixel(self.object_position())])
+        points = self.arm.tip_pose()[0], self.object_position()
+        return np.concatenate([self.world.pixel(point) for point in points])
 
 
 def expert_actions(env: TaskEnv, rng: np.random.Generator | None = None):

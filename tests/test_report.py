@@ -35,7 +35,7 @@ def example():
             "episodes": [{"success": i != 3, "first_success": 2} for i in range(10)],
             "stages": {"translation": 600.0, "policy": 60.0},
             "perception": {"robot": {"tip_x": {"r2": 0.987, "px": 0.42}, "object_y": {"r2": None, "px": 0.1}},
-                           "keypoint_std": [0.25]},
+                           "keypoint_std": [0.25, 0.1099999]},
             "settings": {"seed": 7, "reward": "literal", "recipe": {"K": 5}}, "machine": "two cores",
         },
         "scene_html": SCENE, "command": "python -m tasks push --seed 7",
@@ -141,8 +141,15 @@ def test_the_page_has_every_section(page):
     assert len(titles(page)) == 10
     assert page.count("<img") == 8 + 1 + 2 + 1 + 1  # columns, film, paths, curve, reward
     for text in ("9 of 10", "60-98 %", "11.0 min", "0.987 (0.4)", "python -m tasks push --seed 7",
-                 "two cores", "keypoint std", "recipe K", "✓ ✓ ✓ ✗ ✓"):  # fmt: skip
+                 "two cores", "keypoint std", "0.25, 0.11", "recipe K", "✓ ✓ ✓ ✗ ✓"):  # fmt: skip
         assert text in page
+
+
+def test_pictures_keep_their_colours():
+    red = np.zeros((2, 2, 3), np.uint8)
+    red[..., 0] = 255
+    data = base64.b64decode(report.png(red).split(",")[1])
+    np.testing.assert_array_equal(np.asarray(Image.open(io.BytesIO(data))), red)
 
 
 class Outside(HTMLParser):
