@@ -68,7 +68,8 @@ class TwinCritic(nn.Module):
         W, b = ([p.detach() if frozen else p for p in ps] for ps in (self.weights, self.biases))
         x = torch.cat([s, a], -1).expand(2, -1, -1)  # (2, B, S + A)
         for i in range(2):
-            x = F.relu(F.layer_norm(torch.bmm(x, W[i]), W[i].shape[-1:]) + b[i])  # (2, B, width)
+            # The bias goes in before LayerNorm, which forgets scale: Q(s, a) would equal Q(2s, 2a).
+            x = F.relu(F.layer_norm(torch.baddbmm(b[i], x, W[i]), W[i].shape[-1:]))  # (2, B, width)
         return torch.baddbmm(b[2], x, W[2]).squeeze(-1)  # (2, B)
 
 
@@ -105,10 +106,10 @@ class ReplayBuffer:
 class SAC:
     """Actor, twin critics and temperature with their optimizers.
 
-    obs_dim, action_dim: sizes of the vectors; actions are in [-1, 1]. gamma: discount; a reward that
-    follows a demonstration is dense, so 0.95 looks far enough, 20 steps, and learns sooner than 0.98.
-    tau: pace of the target critics. alpha: first temperature, for rewards of about 1 a step; at 0.1 the
-    first 2,000 steps went into entropy. average: pace of the test-time actor.
+    obs_dim, action_dim: sizes of the vectors; actions are in [-1, 1]. gamma: discount; 0.95 looks 20
+    steps ahead, enough for a reward that is paid at every step. tau: pace of the target critics.
+    alpha: first temperature, for rewards of about 1 a step. average: pace of the test-time actor,
+    500 updates.
     """
 
     def __init__(

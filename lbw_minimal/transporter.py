@@ -26,10 +26,8 @@ from lbw_minimal.training import (
 )
 
 SIGMA = 0.1  # width of a keypoint's Gaussian in units of z: one cell of the 21 x 21 map
-SIGMA_START = 0.4  # a keypoint must first feel the object from afar: at 0.1 the arm takes all of them
-SPREAD = (
-    0.3  # weight of `crowding`, falls to 0 with the wide Gaussians; at 0 one thing may take all keypoints
-)
+SIGMA_START = 0.3  # a keypoint must first feel the object from afar: at 0.1 the arm takes all of them
+SPREAD = 0.06  # weight of `crowding`; at 0 one thing may take all K, at 0.3 some stay on the wall
 GAIN = 10.0  # marginal means are small; without a gain the soft-argmax starts, and stays, near the centre
 GAP = 20  # frames between the two of a pair; further apart is as good as drawn freely
 ACROSS = 0.5  # share of pairs drawn freely: within GAP frames the object has moved in only 4 of 10 pairs

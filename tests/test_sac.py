@@ -72,11 +72,16 @@ def test_the_two_critics_are_two_plain_networks():
     for i in range(2):
         x = torch.cat([s, a], 1)
         for j in range(2):
-            x = x @ critic.weights[j][i]
-            x = (x - x.mean(1, keepdim=True)) / (x.var(1, correction=0, keepdim=True) + 1e-5).sqrt()
-            x = (x + critic.biases[j][i]).relu()
+            x = x @ critic.weights[j][i] + critic.biases[j][i]
+            x = ((x - x.mean(1, keepdim=True)) / (x.var(1, correction=0, keepdim=True) + 1e-5).sqrt()).relu()
         q = x @ critic.weights[2][i] + critic.biases[2][i]
         assert torch.allclose(critic(s, a)[i], q[:, 0], atol=1e-5)
+
+
+def test_the_critics_tell_a_small_state_and_action_from_large_ones():
+    torch.manual_seed(0)
+    critic, s, a = TwinCritic(3, 2, 16), torch.randn(5, 3), torch.randn(5, 2)
+    assert (critic(s, a) - critic(2 * s, 2 * a)).abs().mean() > 0.01
 
 
 # One update ---------------------------------------------------------------------------------------
@@ -93,6 +98,12 @@ def test_the_target_holds_the_entropy_term():
         torch.manual_seed(1)
         targets.append(sac.critic_target(batch))
     assert torch.allclose(targets[0] - targets[1], sac.gamma * 0.5 * log_pi, atol=1e-5)
+
+
+def test_the_target_takes_the_lesser_of_the_two_critics():
+    sac = small()
+    sac.target.biases[2].data[:, 0, 0] = torch.tensor([1000.0, -1000.0])
+    assert (sac.critic_target(batch_of()) < -900).all()
 
 
 def test_only_a_terminal_state_ends_the_sum():

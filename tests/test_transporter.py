@@ -7,6 +7,8 @@ import torch
 from lbw_minimal import transporter as tp
 from lbw_minimal.training import Checkpoint, InputError
 
+TRAINING = 60  # iterations of the one training that several claims share, a second for ten
+
 
 def squares(T=240, seed=0):
     """A red and a blue square, 14 pixels wide, on separate smooth paths; true centres (T, 2, 2) in pixels."""
@@ -29,9 +31,6 @@ def trained():
     frames, centres = squares()
     model, log = tp.train([frames[:180]], iterations=TRAINING, seed=0, K=4)
     return model, log, tp.detect(model, frames), frames, centres
-
-
-TRAINING = 100  # iterations; a second for every eight
 
 
 def follow(z, centres):
@@ -197,9 +196,9 @@ def test_r2_by_hand_on_a_held_out_set():
     assert tp.pixel_error(z, true, z_held, true_held) == pytest.approx([2**0.5])
 
 
-def test_r2_of_noise_is_not_above_0():
+def test_r2_of_noise_is_below_0_on_average():
     rng = np.random.default_rng(0)
-    assert (tp.r2(rng.normal(size=(40, 5, 2)), rng.normal(size=(40, 4))) <= 0).all()
+    assert tp.r2(rng.normal(size=(200, 5, 2)), rng.normal(size=(200, 100))).mean() < 0
 
 
 def test_saved_model_comes_back_with_its_sizes(tmp_path):
