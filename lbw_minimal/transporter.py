@@ -28,7 +28,7 @@ from lbw_minimal.training import (
 SIGMA = 0.1  # width of a keypoint's Gaussian in units of z: one cell of the 21 x 21 map
 SIGMA_START = 0.3  # a keypoint must first feel the object from afar: at 0.1 the arm takes all of them
 SPREAD = 0.06  # weight of `crowding`; at 0 one thing may take all K, at 0.3 some stay on the wall
-GAIN = 10.0  # marginal means are small; without a gain the soft-argmax starts, and stays, near the centre
+GAIN = 10.0  # a marginal mean divides a peak by 21; at 1 even a peak of 30 is read as nearly the centre
 GAP = 20  # frames between the two of a pair; further apart is as good as drawn freely
 ACROSS = 0.5  # share of pairs drawn freely: within GAP frames the object has moved in only 4 of 10 pairs
 MOTION = 10.0  # weight of what differs from the median frame, see `motion_weight`

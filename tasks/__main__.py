@@ -97,7 +97,7 @@ def record(name):
 
 
 def run(args):
-    """One task from its human video to its report. Returns the success rate."""
+    """One task, from its human video to its report."""
     name, module = args.what, task_module(args.what)
     recipe = dataclasses.replace(module.RECIPE, **FAST) if args.fast else module.RECIPE
     pick_device(args.device)  # say so before anything else if there is none
@@ -122,6 +122,8 @@ def run(args):
     if args.evaluate:
         shutil.copy(policy, out / "policy.safetensors")
     here = Run(out)
+    command = "python -m tasks " + shlex.join(args.given)
+    here.metrics["command"] = command
     here.metrics["settings"] = settings | {"recipe": dataclasses.asdict(recipe)}
     here.metrics["machine"] = f"{platform.machine()}, {os.cpu_count()} cores, torch {torch.__version__}"
 
@@ -139,6 +141,7 @@ def run(args):
         if "perception" not in here.metrics:
             here.metrics["perception"] = probe(task_id(name), perception, PROBE_SEED + args.seed)
             here.save()
+    torch.set_num_threads(1)  # SAC's networks are small: a second thread costs more than it brings
     env = gym.make(task_id(name), jitter=JITTER)
     agent, env = imitate(env, demo, robot, perception, recipe, seed=args.seed, run=here, form=args.reward)
 
@@ -151,10 +154,18 @@ def run(args):
     here.save()
     log = out / "policy_log.json"
     log = json.loads(log.read_text()) if log.exists() else []  # a replayed policy brings none
-    write_report(out / "report.html", task=name, demo=demo, translated=perception.translated,
-                 z_demo=perception.z_E, log=log,
-                 episode=first, metrics=here.metrics, scene_html=scene,
-                 command="python -m tasks " + shlex.join(args.given))  # fmt: skip
+    write_report(
+        out / "report.html",
+        task=name,
+        demo=demo,
+        translated=perception.translated,
+        z_demo=perception.z_E,
+        log=log,
+        episode=first,
+        metrics=here.metrics,
+        scene_html=scene,
+        command=command,
+    )
     print(f"{name}: {wins}/{n} successes (95% CI {low:.2f}-{high:.2f})")
     print(f"report: {out / 'report.html'}")
 
@@ -188,7 +199,7 @@ def evaluate(agent, env, n):
     for i in range(n):
         z, _ = env.reset(seed=TEST_SEED + i)
         base = env.unwrapped
-        recorder = Recorder(base.world.p._client) if i == 0 else None
+        recorder = Recorder(base.world.client) if i == 0 else None
         film, zs, parts, done, hits = [], [z], [], False, []
         if recorder:
             recorder.snap()

@@ -63,6 +63,7 @@ class World:
     def __init__(self, embodiment: str):
         with _silence():
             self.p = BulletClient(connection_mode=pybullet.DIRECT)
+        self.client = self.p._client  # PyBullet's number for it
         look = LOOKS[embodiment]
         self.p.setGravity(0, 0, -9.81)
         self.p.setPhysicsEngineParameter(fixedTimeStep=DT, deterministicOverlappingPairs=1)
