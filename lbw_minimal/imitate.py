@@ -49,6 +49,11 @@ class Perception:
         """Human frames (T, 84, 84, 3) uint8 as the robot would look, same shape."""
         return munit.translate(self.translator, frames, self.style)
 
+    def watch(self, demo: np.ndarray) -> None:
+        """Translate the demonstration (N, 84, 84, 3) uint8 and find its keypoint trajectory, once."""
+        self.translated = self.translate(demo)  # v_1^E .. v_N^E
+        self.z_E = self.detect(self.translated)  # z_1^E .. z_N^E
+
     def detect(self, frames: np.ndarray) -> np.ndarray:
         """Keypoints (T, K, 2) of robot frames, real or translated."""
         return transporter.detect(self.detector, frames)
@@ -122,8 +127,7 @@ def imitate(env, demo, robot, perception: Perception, recipe: Recipe, *, seed, r
     form: "literal" for Eq. 8-10 as written, "mended" for what `reward.py` adds.
     Returns the agent and `env` wrapped so that its observations are the policy's.
     """
-    perception.translated = perception.translate(demo)  # v_1^E .. v_N^E
-    perception.z_E = perception.detect(perception.translated)  # z_1^E .. z_N^E, (N, K, 2)
+    perception.watch(demo)
     horizon = env.spec.max_episode_steps
     reward = KeypointReward(perception.z_E, perception.detect(robot), form=form, horizon=horizon)
     env = KeypointRewardWrapper(KeypointObservation(env, perception.detect), reward)

@@ -34,8 +34,9 @@ class KeypointRewardWrapper(gym.Wrapper):
     The observation is z_t (2K,), as in the paper. If the reward is timed, the same z_t earns different
     rewards at different times, so the agent has to know the time. It is told in the demonstration's own
     coordinates: (z_t, z^E_{t+1} - z_t, clock), (4K + 1,), the way to where the demonstration will be
-    and how much of it has passed, 0 to 1. The clock alone would do in theory; in practice an agent then
-    has to learn the whole demonstration by heart before it follows closely enough to touch the object.
+    and how much of it has passed, 0 to 1. The clock alone would do in theory, but then the
+    agent has to learn the demonstration by heart: on push, seed 0, it had not solved the task after 4,000
+    steps, with the way it first did after 2,500.
     """
 
     def __init__(self, env: gym.Env, reward):

@@ -138,12 +138,13 @@ def run(args):
         perception = learn_perception(
             demo, random, robot, recipe, task=name, seed=args.seed, run=here, device=args.device
         )
-        if "perception" not in here.metrics:
-            here.metrics["perception"] = probe(task_id(name), perception, PROBE_SEED + args.seed)
-            here.save()
     torch.set_num_threads(1)  # SAC's networks are small: a second thread costs more than it brings
     env = gym.make(task_id(name), jitter=JITTER)
     agent, env = imitate(env, demo, robot, perception, recipe, seed=args.seed, run=here, form=args.reward)
+
+    # The probe films the simulated human, whom a perception trained on another video never saw.
+    if from_scratch and args.video is None and "perception" not in here.metrics:
+        here.metrics["perception"] = probe(task_id(name), perception, PROBE_SEED + args.seed)
 
     episodes, first, scene = evaluate(agent, env, 2 if args.fast else TEST_EPISODES)
     here.metrics["episodes"] = episodes

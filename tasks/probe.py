@@ -11,7 +11,7 @@ import gymnasium as gym
 import numpy as np
 
 from lbw_minimal.transporter import r2
-from tasks.world import record_random
+from tasks.world import record_expert, record_random
 
 NAMES = ("tip_x", "tip_y", "object_x", "object_y")
 
@@ -19,9 +19,10 @@ NAMES = ("tip_x", "tip_y", "object_x", "object_y")
 def probe(task_id: str, perception, seed: int, frames: int = 400) -> dict:
     """Figures of one task's perception, by frames filmed with seeds that no training uses.
 
-    Returns R^2 per coordinate on robot and translated frames, each with the residual in pixels, the
-    standard deviation of every keypoint, and in the translated demonstration the distance from tip to
-    object while that moves, minus the robot's own when it pushes, in pixels.
+    Returns R^2 per coordinate on robot and translated frames, each with the residual in pixels, and the
+    standard deviation of every keypoint. Where something is touched, also the way from tip to object in
+    pixels while the object moves, as the keypoints show it in the translated demonstration and in a
+    robot expert's film: they agree if the translated gripper touches what it seems to push.
     """
     robot = gym.make(task_id, embodiment="robot").unwrapped
     human = gym.make(task_id, embodiment="human").unwrapped
@@ -45,8 +46,18 @@ def probe(task_id: str, perception, seed: int, frames: int = 400) -> dict:
             n: {"r2": round(float(s), 3) if m else None, "px": round(float(e), 2)}
             for n, s, m, e in zip(NAMES, score, moves, np.sqrt((error**2).mean(0)), strict=True)
         }
+    if robot.CONTACT:
+        pixels = linear(z[:frames], truth[:frames])
+        expert = perception.detect(record_expert(robot, seed)[0])
+        out["contact_px"] = {"demonstration": gap(pixels(perception.z_E)), "robot": gap(pixels(expert))}
     out["keypoint_std"] = np.round(z.reshape(len(z), -1).std(0), 3).tolist()
     return out
+
+
+def gap(px):
+    """Mean x from tip to object over the frames (T, 4) in which the object moves by half a pixel or more."""
+    moving = np.abs(np.gradient(px[:, 2])) > 0.5
+    return round(float((px[moving, 2] - px[moving, 0]).mean()), 2)
 
 
 def linear(z, pixels):
