@@ -110,9 +110,9 @@ def learn_perception(demo, random, robot, recipe, *, task, seed, run, device="cp
     path = run.out / "keypoints.safetensors"
     if not path.exists():
         with run.stage("keypoints") as checkpoint:
-            v, v_random = (munit.translate(T, x, style) for x in (demo, random) if len(x))
+            v = [munit.translate(T, x, style) for x in (demo, random) if len(x)]
             Psi, log = transporter.train(
-                [v, v_random, robot], iterations=recipe.transporter_iterations, K=recipe.K,
+                [*v, robot], iterations=recipe.transporter_iterations, K=recipe.K,
                 seed=seed, device=device, checkpoint=checkpoint,
             )  # fmt: skip
             run.log("keypoints_log", log)

@@ -1,0 +1,29 @@
+"""The method as a whole, on data too small to learn anything from."""
+
+import numpy as np
+
+from lbw_minimal.imitate import Recipe, Run, learn_perception, load_perception
+
+TINY = Recipe(human_frames=6, robot_frames=6, munit_iterations=1, munit_width=4, transporter_iterations=1)
+
+
+def frames(n):
+    return np.random.default_rng(n).integers(0, 256, (n, 84, 84, 3), np.uint8)
+
+
+def test_one_video_alone_may_be_the_whole_human_domain(tmp_path):
+    nothing = frames(6)[:0]
+    P = learn_perception(frames(6), nothing, frames(7), TINY, task="push", seed=0, run=Run(tmp_path))
+    P.watch(frames(6))
+    assert P.translated.shape == (6, 84, 84, 3) and P.z_E.shape == (6, TINY.K, 2)
+
+
+def test_a_finished_stage_is_loaded_and_not_trained_again(tmp_path):
+    arguments = (frames(6), frames(8), frames(7), TINY)
+    first = learn_perception(*arguments, task="push", seed=0, run=Run(tmp_path))
+    again = learn_perception(*arguments, task="push", seed=1, run=Run(tmp_path))
+    loaded = load_perception(tmp_path, "push")
+    for other in (again, loaded):
+        np.testing.assert_array_equal(other.detect(frames(3)), first.detect(frames(3)))
+    assert set(Run(tmp_path).metrics["stages"]) == {"translation", "keypoints"}
+    assert not list(tmp_path.glob("*.checkpoint"))
