@@ -71,7 +71,7 @@ def main():
 
     rng = np.random.default_rng(0)
     frames = rng.integers(0, 256, (64, 84, 84, 3), np.uint8)
-    show("MUNIT", rate(lambda n: munit.train(frames, frames, iterations=n, seed=0), 4), "iterations/s")
+    show("MUNIT", rate(lambda n: munit.train(frames, frames, iterations=n, seed=0), 10), "iterations/s")
     show("Transporter", rate(lambda n: transporter.train([frames], iterations=n, seed=0), 10), "iterations/s")
 
     obs_dim, action_dim, batch, width = 11, 3, 128, 256
@@ -116,7 +116,7 @@ def sb3_updates(obs_dim, action_dim, batch, width):
             return np.random.standard_normal(obs_dim).astype(np.float32), 0.0, False, False, {}  # noqa: NPY002
 
     model = SAC("MlpPolicy", Noise(), batch_size=batch, policy_kwargs={"net_arch": [width, width]},
-                learning_starts=1000, train_freq=10**6, device="cpu")  # fmt: skip
+                learning_starts=1000, train_freq=1000, device="cpu")  # fmt: skip
     model.learn(1000)
     model.set_logger(configure(None, []))
     return updates(lambda: model.train(gradient_steps=1, batch_size=batch))
