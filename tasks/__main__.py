@@ -200,7 +200,11 @@ def evaluate(agent, env, n):
     for i in range(n):
         z, _ = env.reset(seed=TEST_SEED + i)
         base = env.unwrapped
-        recorder = Recorder(base.world.client) if i == 0 else None
+        recorder = None
+        if i == 0:
+            base.world.show_table(True)
+            recorder = Recorder(base.world.client)
+            base.world.show_table(False)
         film, zs, parts, done, hits = [], [z], [], False, []
         if recorder:
             recorder.snap()

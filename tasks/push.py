@@ -29,7 +29,7 @@ class Push(TaskEnv):
     def build(self):
         self.cube = self.world.box((CUBE / 2,) * 3, (CUBE_START, 0, CUBE / 2), RED, mass=CUBE_MASS)
         self.world.p.changeDynamics(self.cube, -1, lateralFriction=CUBE_FRICTION)
-        self.world.cylinder(0.03, 0.002, self.target_position() * (1, 1, 0), GREEN, solid=False)
+        self.world.cylinder(0.03, 0.001, (TARGET, 0, 0.0005), GREEN, solid=False)
 
     def place(self, offset, scatter):
         position = np.array([CUBE_START, 0, CUBE / 2]) + offset

@@ -74,9 +74,17 @@ class World:
         )
         self.projection = self.p.computeProjectionMatrixFOV(CAMERA_FOV, 1.0, 0.3, 3.0)
         self.light = look["light"]
-        # The wall is painted behind the picture: as a body it would take half the rendering time.
+        # Wall and table never change and nothing is behind them: painted once, then only what moves is
+        # rendered, which takes half the time.
         shade = np.linspace(1.06, 0.94, SIZE * SUPERSAMPLE)[:, None, None]  # lighter near the ceiling
-        self.wall = np.uint8(shade * look["wall"][:3] * 255)
+        self.backdrop = np.uint8(shade * look["wall"][:3] * 255)
+        self.backdrop = self._composite()
+        self.show_table(False)
+
+    def show_table(self, visible: bool) -> None:
+        """Show the table to whoever reads the scene, as the 3-D viewer does, or leave it to the backdrop."""
+        rgba = (*self.p.getVisualShapeData(self.table)[0][7][:3], float(visible))
+        self.p.changeVisualShape(self.table, -1, rgbaColor=rgba)
 
     def box(self, half, position, rgba, mass=0.0, solid=True) -> int:
         """Add a box of half extents `half`; static where `mass` (kg) is 0, untouchable if not solid."""
@@ -103,6 +111,10 @@ class World:
 
     def render(self) -> np.ndarray:
         """The camera's picture, (84, 84, 3) uint8 RGB."""
+        return cv2.resize(self._composite(), (SIZE, SIZE), interpolation=cv2.INTER_AREA)
+
+    def _composite(self):
+        """What moves, rendered over the backdrop at SUPERSAMPLE times the size."""
         size = SIZE * SUPERSAMPLE
         _, _, rgba, depth, _ = self.p.getCameraImage(
             size, size, self.view, self.projection, lightDirection=self.light, shadow=0,
@@ -111,7 +123,7 @@ class World:
         )  # fmt: skip
         rgb = np.asarray(rgba, np.uint8).reshape(size, size, 4)[..., :3]
         empty = np.asarray(depth).reshape(size, size, 1) > 0.999
-        return cv2.resize(np.where(empty, self.wall, rgb), (SIZE, SIZE), interpolation=cv2.INTER_AREA)
+        return np.where(empty, self.backdrop, rgb)
 
     def pixel(self, point) -> np.ndarray:
         """Where a world point (m) appears in the image: (x right, y down) in pixels."""
