@@ -121,9 +121,10 @@ class World:
             lightAmbientCoeff=0.65, lightDiffuseCoeff=0.35, lightSpecularCoeff=0.0,
             renderer=self.p.ER_TINY_RENDERER, flags=self.p.ER_NO_SEGMENTATION_MASK,
         )  # fmt: skip
-        rgb = np.asarray(rgba, np.uint8).reshape(size, size, 4)[..., :3]
-        empty = np.asarray(depth).reshape(size, size, 1) > 0.999
-        return np.where(empty, self.backdrop, rgb)
+        seen = np.asarray(depth).reshape(size, size) < 0.999
+        picture = np.array(np.broadcast_to(self.backdrop, (size, size, 3)))
+        picture[seen] = np.asarray(rgba, np.uint8).reshape(size, size, 4)[seen, :3]
+        return picture
 
     def pixel(self, point) -> np.ndarray:
         """Where a world point (m) appears in the image: (x right, y down) in pixels."""
