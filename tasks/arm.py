@@ -243,9 +243,10 @@ class Arm:
             length = np.abs(error).max()
             if length < 1e-9:
                 break
-            inverse = np.linalg.pinv(self.jacobian(q))
+            J = self.jacobian(q)
+            inverse = np.linalg.pinv(J)
             posture = self.home - q
-            posture -= inverse @ (self.jacobian(q) @ posture)
+            posture -= inverse @ (J @ posture)
             # Short steps, and near the rest posture: a long one may land with the elbow upside down.
             q = q + inverse @ error * min(1, 0.05 / length) + 0.2 * posture * (length > 1e-3)
         self.goal = np.array(tip, float)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import gymnasium as gym
 import numpy as np
 
-from lbw_minimal.transporter import r2
+from lbw_minimal.transporter import pixel_error, r2
 from tasks.world import record_expert, record_random
 
 NAMES = ("tip_x", "tip_y", "object_x", "object_y")
@@ -40,11 +40,11 @@ def probe(task_id: str, perception, seed: int, frames: int = 400) -> dict:
     out = {}
     for name, (z_fit, px_fit, z_held, px_held) in sets.items():
         moves = px_held.std(0) > 0.5  # R^2 says nothing of what does not move
-        error = px_held - linear(z_fit, px_fit)(z_held)
         score = r2(z_fit, px_fit, z_held, px_held)
+        error = pixel_error(z_fit, px_fit, z_held, px_held)
         out[name] = {
             n: {"r2": round(float(s), 3) if m else None, "px": round(float(e), 2)}
-            for n, s, m, e in zip(NAMES, score, moves, np.sqrt((error**2).mean(0)), strict=True)
+            for n, s, m, e in zip(NAMES, score, moves, error, strict=True)
         }
     if robot.CONTACT:
         pixels = linear(z[:frames], truth[:frames])

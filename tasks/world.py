@@ -187,6 +187,10 @@ class TaskEnv(gym.Env):
         """Centre of the thing the task is about, (3,) in m."""
         raise NotImplementedError
 
+    def target_position(self) -> np.ndarray:
+        """Where that thing has to get, (3,) in m."""
+        raise NotImplementedError
+
     def is_success(self) -> bool:
         """Whether the task is done now."""
         raise NotImplementedError
