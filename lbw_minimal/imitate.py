@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from gymnasium.wrappers import TimeLimit
 
 from lbw_minimal import munit, sac, transporter
 from lbw_minimal.reward import KeypointReward
@@ -32,7 +33,7 @@ class Recipe:
     munit_width: int = 20  # channels of the first layer
     transporter_iterations: int = 600
     K: int = 5  # keypoints
-    policy_steps: int = 6_000  # environment steps of SAC
+    policy_steps: int = 10_000  # environment steps of SAC
 
 
 @dataclass
@@ -120,23 +121,36 @@ def learn_perception(demo, random, robot, recipe, *, task, seed, run, device="cp
     return Perception(T, style, transporter.load(path, task))
 
 
-def imitate(env, demo, robot, perception: Perception, recipe: Recipe, *, seed, run: Run, form="mended"):
+def watched(env, perception: Perception, robot, form="mended", without=None):
+    """`env` as the paper's agent sees it, observing keypoints and earning r_t, and its `KeypointReward`.
+
+    `perception` has watched the demonstration; the other arguments are those of `imitate`.
+    """
+    switches = {without: False} if without else {}
+    horizon = env.spec.max_episode_steps
+    reward = KeypointReward(perception.z_E, perception.detect(robot), form=form, horizon=horizon, **switches)
+    return KeypointRewardWrapper(KeypointObservation(env, perception.detect), reward), reward
+
+
+def imitate(
+    env, demo, robot, perception: Perception, recipe: Recipe, *, seed, run: Run, form="mended", without=None
+):
     """Learn a policy for `env`, a Gymnasium environment of RGB frames, from one demonstration.
 
     demo (N, 84, 84, 3) uint8: the human video. robot (M, 84, 84, 3) uint8: random robot motion.
-    form: "literal" for Eq. 8-10 as written, "mended" for what `reward.py` adds.
-    Returns the agent and `env` wrapped so that its observations are the policy's.
+    form: "literal" for Eq. 8-10 as written, "mended" for what `reward.py` adds; without: one of `MENDS`
+    to leave out. Returns the agent and `env` wrapped so that its observations are the policy's.
     """
     perception.watch(demo)
-    horizon = env.spec.max_episode_steps
-    reward = KeypointReward(perception.z_E, perception.detect(robot), form=form, horizon=horizon)
-    env = KeypointRewardWrapper(KeypointObservation(env, perception.detect), reward)
+    env, reward = watched(env, perception, robot, form, without)
+    # Long after the demonstration's end nothing is left to learn: practise in shorter episodes.
+    practice = TimeLimit(env, min(env.spec.max_episode_steps, reward.episode))
     path = run.out / "policy.safetensors"
     if path.exists():
         agent = sac.load(path)
     else:
         with run.stage("policy") as checkpoint:
-            agent, log = sac.train(env, steps=recipe.policy_steps, seed=seed, checkpoint=checkpoint)
+            agent, log = sac.train(practice, steps=recipe.policy_steps, seed=seed, checkpoint=checkpoint)
             run.log("policy_log", log)
             sac.save(path, agent)
     return agent, env

@@ -15,6 +15,7 @@ from .training import InputError
 
 LEAST_STEP = 0.25  # of the robot's step: what moves less from frame to frame is a pause
 MOST_OF_HORIZON = 0.7  # the demonstration's share of an episode, so that time is left to reach its goal
+MENDS = ("trim", "speed", "include_goal", "weights", "timed")  # the switches of `KeypointReward`
 STILL = 0.1  # of the widest keypoint's extent: a keypoint that moves less takes no part in the skill
 
 
@@ -24,6 +25,11 @@ def _steps(z):
 
 def _median_step(z):
     return float(np.median(np.linalg.norm(_steps(z), axis=1)))
+
+
+def _top_step(z):
+    # 90th percentile: resets of a random video, one frame in twenty, stay out.
+    return float(np.quantile(np.linalg.norm(_steps(z), axis=1), 0.9))
 
 
 def keypoint_noise(video: np.ndarray) -> np.ndarray:
@@ -45,26 +51,28 @@ def trim_pauses(z: np.ndarray, least: float) -> np.ndarray:
 
 
 def resample(z: np.ndarray, step: float, longest: int) -> np.ndarray:
-    """Stretch the time of z (N, K, 2) by one factor that makes its median step `step`.
+    """Stretch the time of z (N, K, 2) until its top step (90th percentile) is at most `step`.
 
-    One factor, not one speed: a strike stays faster than the approach to it. The result has at most
-    `longest` frames.
+    Never faster than it was: what slides or falls has a time of its own. One factor, not one speed: a
+    strike stays faster than the approach to it. Only where there would be more than `longest` frames is
+    the whole hurried on to as many.
     """
-    n = int(np.clip(round((len(z) - 1) * _median_step(z) / step) + 1, 2, longest))
+    n = int(np.clip(round((len(z) - 1) * max(1.0, _top_step(z) / step)) + 1, 2, longest))
     t = np.linspace(0, len(z) - 1, n)
     i = np.minimum(t.astype(int), len(z) - 2)
     return z[i] + (t - i)[:, None, None] * (z[i + 1] - z[i])  # (n, K, 2)
 
 
 def prepare(z, robot, *, horizon=None, trim=True, speed=True) -> np.ndarray:
-    """The demonstration (N, K, 2) as the robot could do it: no glitches, no pauses, the robot's pace.
+    """The demonstration (N, K, 2) as the robot could do it: no glitches, no pauses, no step too long.
 
-    robot (M, K, 2): its random video, whose median step is the pace. Arguments as `KeypointReward`.
+    robot (M, K, 2): its random video shows the robot's pace. Arguments as `KeypointReward`.
     """
     z, step = np.asarray(z, np.float64), _median_step(robot)
     z = np.concatenate([z[:1], np.median([z[:-2], z[1:-1], z[2:]], axis=0), z[-1:]])  # one lost frame
     z = trim_pauses(z, LEAST_STEP * step) if trim else z
-    return resample(z, step, int(MOST_OF_HORIZON * horizon) if horizon else len(z) * 10) if speed else z
+    longest = int(MOST_OF_HORIZON * horizon) if horizon else 10 * len(z)
+    return resample(z, _top_step(robot), longest) if speed else z
 
 
 def keypoint_weights(z: np.ndarray, robot: np.ndarray) -> np.ndarray:
@@ -88,12 +96,12 @@ class KeypointReward:
     video, which the mended form needs for the robot's pace and the jitter. horizon: steps of an
     episode; the prepared demonstration takes at most 70 % of it. lam: (lambda_r1, lambda_r2).
 
-    The mends: `trim` cuts pauses, which make idling look like the skill; `speed` brings the
-    demonstration to the robot's pace; `include_goal` lets p reach N; `weights` weighs keypoints (off:
-    all alike); `timed` takes p = q = t instead of the nearest frame, so that falling behind costs.
-    The mended reward also judges z_{t+1}, which a_t can still change, where Eq. 9 judges z_t, and adds
-    up lengths per keypoint, each capped at twice the path: a lost keypoint costs a bounded share.
-    Its unit: r1 = -1 is an arm that never moved, seen at the end. It lies in [-2 sum(lam), 0].
+    The mends: `trim` cuts pauses, which make idling look like the skill; `speed` slows the
+    demonstration down to the robot's pace where it is faster; `include_goal` lets p reach N; `weights`
+    weighs keypoints (off: all alike); `timed` takes p = q = t instead of the nearest frame, so that
+    falling behind costs. The mended reward also judges z_{t+1}, which a_t can still change, where Eq. 9
+    judges z_t, and adds up lengths per keypoint, each capped at twice the path: a lost keypoint costs a
+    bounded share. Its unit: r1 = -1 is an arm that never moved, seen at the end. It lies in [-2 sum(lam), 0].
 
     Raises InputError where shapes do not fit or nothing moves in the demonstration.
     """
@@ -136,6 +144,11 @@ class KeypointReward:
 
     def __len__(self):
         return len(self.z_E)
+
+    @property
+    def episode(self) -> int:
+        """Steps of an episode in which the demonstration takes its share."""
+        return round(len(self.z_E) / MOST_OF_HORIZON)
 
     def _distance(self, d):
         """Norm of the differences d (..., K, 2) over all keypoints: (...)."""

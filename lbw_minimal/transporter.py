@@ -28,7 +28,8 @@ from lbw_minimal.training import (
 SIGMA = 0.1  # width of a keypoint's Gaussian in units of z: one cell of the 21 x 21 map
 SIGMA_START = 0.3  # a keypoint must first feel the object from afar: at 0.1 the arm takes all of them
 SPREAD = 0.06  # weight of `crowding`; at 0 one thing may take all K, at 0.3 some stay on the wall
-GAIN = 10.0  # a marginal mean divides a peak by 21; at 1 even a peak of 30 is read as nearly the centre
+GAIN = 3.0  # of the logits: at 1 a peak of 6 among 441 cells is read as half-way to the centre
+LOOK = 0.02  # weight of `identity`; at 0 two keypoints may share arm and object as "left" and "right one"
 GAP = 20  # frames between the two of a pair; further apart is as good as drawn freely
 ACROSS = 0.5  # share of pairs drawn freely: within GAP frames the object has moved in only 4 of 10 pairs
 MOTION = 10.0  # weight of what differs from the median frame, see `motion_weight`
@@ -56,15 +57,24 @@ def _cells(n, like):
 
 
 def soft_argmax(logits: torch.Tensor) -> torch.Tensor:
-    """Keypoints (B, K, 2) of logits (B, K, h, w): mean position under the softmax of each marginal mean."""
-    x = (GAIN * logits.mean(2)).softmax(-1) @ _cells(logits.shape[3], logits)  # (B, K)
-    y = (GAIN * logits.mean(3)).softmax(-1) @ _cells(logits.shape[2], logits)
+    """Keypoints (B, K, 2) of logits (B, K, h, w): the mean position under the softmax over the whole map.
+
+    Kulkarni et al. take a softmax of each marginal. Then x may come from the arm and y from the object.
+    """
+    p = (GAIN * logits.flatten(2)).softmax(-1).view(logits.shape)
+    x = p.sum(2) @ _cells(logits.shape[3], logits)  # (B, K)
+    y = p.sum(3) @ _cells(logits.shape[2], logits)
     return torch.stack([x, y], -1)
+
+
+def _bumps(z, sigma, size):
+    # Each keypoint's Gaussian exp(-d^2 / sigma^2) along x and along y: (B, K, 2, size).
+    return torch.exp(-(((_cells(size, z) - z[..., None]) / sigma) ** 2))
 
 
 def heat_map(z: torch.Tensor, sigma: float = SIGMA, size: int = 21) -> torch.Tensor:
     """H (B, 1, size, size) in [0, 1] of keypoints z (B, K, 2), each a Gaussian exp(-d^2 / sigma^2)."""
-    g = torch.exp(-(((_cells(size, z) - z[..., None]) / sigma) ** 2))  # (B, K, 2, size)
+    g = _bumps(z, sigma, size)
     h = g[:, :, 1, :, None] * g[:, :, 0, None, :]  # (B, K, size, size)
     return 1 - (1 - h).prod(1, keepdim=True)  # a sum would exceed 1 where keypoints meet
 
@@ -97,6 +107,17 @@ def crowding(z: torch.Tensor, sigma: float) -> torch.Tensor:
     d2 = ((z[:, :, None] - z[:, None]) ** 2).sum(-1)  # (B, K, K)
     K = z.shape[1]
     return (torch.exp(-d2 / (2 * sigma**2)).sum((1, 2)) - K).mean() / K**2  # less the K with themselves
+
+
+def identity(z: torch.Tensor, y: torch.Tensor) -> torch.Tensor:
+    """Variance over the batch of the mean colour under each keypoint z (B, K, 2) of y (B, 3, 84, 84).
+
+    Not in the paper. A keypoint has to be the same thing in every frame, and a thing keeps its colour.
+    """
+    g = _bumps(z, SIGMA, 21)
+    g = g / g.sum(-1, keepdim=True)
+    colour = torch.einsum("bkh,bkw,bchw->bkc", g[:, :, 1], g[:, :, 0], F.avg_pool2d(y, 4))  # (B, K, 3)
+    return colour.var(0).sum(-1).mean()
 
 
 class Transporter(nn.Module):
@@ -203,7 +224,7 @@ def train(
         y_hat, z_y = model(x, y, _augment(y), sigma)
         error = loss(y_hat, y, motion_weight(y, median))
         optimizer.zero_grad()
-        (error + SPREAD * early * crowding(z_y, sigma)).backward()
+        (error + SPREAD * early * crowding(z_y, sigma) + LOOK * (1 - early) * identity(z_y, y)).backward()
         nn.utils.clip_grad_norm_(model.parameters(), 1.0)
         optimizer.step()
         step += 1

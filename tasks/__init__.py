@@ -1,15 +1,26 @@
 """The five tasks, registered with Gymnasium when this package is imported."""
 
 from importlib import import_module
+from pathlib import Path
+from types import ModuleType
 
 import gymnasium as gym
 
-TASKS = ("reach", "push")
+ROOT = Path(__file__).resolve().parent.parent
+VIDEOS = ROOT / "tasks" / "videos"
+WEIGHTS = ROOT / "solutions" / "weights"
+TASKS = ("reach", "push", "slide", "coffee", "drawer")
+
+
+def module(name: str) -> ModuleType:
+    """The task's file."""
+    return import_module(f"tasks.{name}")
+
+
+def id_of(name: str) -> str:
+    """What Gymnasium calls the task."""
+    return f"LbW-{name.capitalize()}-v0"
+
 
 for _name in TASKS:
-    _module = import_module(f"tasks.{_name}")
-    gym.register(
-        f"LbW-{_name.capitalize()}-v0",
-        f"tasks.{_name}:{_name.capitalize()}",
-        max_episode_steps=_module.HORIZON,
-    )
+    gym.register(id_of(_name), f"tasks.{_name}:{_name.capitalize()}", max_episode_steps=module(_name).HORIZON)

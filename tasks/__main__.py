@@ -2,6 +2,9 @@
 
 python -m tasks TASK      learn TASK from its human video, evaluate, write runs/TASK/report.html
 python -m tasks record T  film the human videos of task T again
+python -m tasks table     the results of all tasks; what is missing is run first
+python -m tasks ablation  what each mend of the reward is worth
+python -m tasks gallery   one page with every task's scene, demonstration and best rollout
 python -m tasks bench     steps, iterations and updates a second on this machine
 """
 
@@ -29,20 +32,19 @@ import tasks
 from lbw_minimal import sac, video
 from lbw_minimal.imitate import Run, imitate, learn_perception, load_perception
 from lbw_minimal.report import wilson, write_report
+from lbw_minimal.reward import MENDS
 from lbw_minimal.training import InputError, pick_device, seed_everything, write_atomic
 from tasks.probe import probe
-from tasks.viewer import Recorder
+from tasks.viewer import mirror
 from tasks.world import record_expert, record_random
 
-ROOT = Path(__file__).resolve().parent.parent
-VIDEOS = ROOT / "tasks" / "videos"
-WEIGHTS = ROOT / "solutions" / "weights"
 FPS = 25
 EXPERTS = 15  # videos of the task being done; the method learns from the first alone
 TEST_EPISODES = 10  # as in the paper
 JITTER = 0.005  # m, start jitter, so that ten test episodes are ten episodes
 TEST_SEED = 1_000_000  # first seed of the test episodes, far from those of training
 PROBE_SEED = 2_000_000
+OTHERS = ("record", "table", "ablation", "gallery", "bench")
 RESULTS = ("*.checkpoint", "*.safetensors", "*_log.json", "metrics.json", "report.html")
 FAST = {"munit_iterations": 20, "munit_width": 8, "transporter_iterations": 30, "policy_steps": 1000,
         "robot_frames": 200}  # fmt: skip
@@ -50,7 +52,7 @@ FAST = {"munit_iterations": 20, "munit_width": 8, "transporter_iterations": 30, 
 
 def parse(argv):
     parser = argparse.ArgumentParser(prog="python -m tasks", description=__doc__.splitlines()[0])
-    parser.add_argument("what", help=f"a task ({', '.join(tasks.TASKS)}), or record, or bench")
+    parser.add_argument("what", help=f"a task ({', '.join(tasks.TASKS)}), or {', '.join(OTHERS)}")
     parser.add_argument("task", nargs="?", help="with record: the task to film")
     parser.add_argument("--video", type=Path, help="another human video, as the whole human domain")
     parser.add_argument("--out", type=Path, help="folder of the run (runs/TASK)")
@@ -58,6 +60,8 @@ def parse(argv):
     parser.add_argument("--device", default="cpu", help="cpu or cuda")
     parser.add_argument("--threads", type=int, default=0, help="torch threads (all cores)")
     parser.add_argument("--reward", choices=("mended", "literal"), default="mended")
+    parser.add_argument("--without", choices=MENDS, help="leave one mend of the reward out")
+    parser.add_argument("--jobs", type=int, default=1, help="with table and ablation: runs at a time")
     parser.add_argument("--from-scratch", action="store_true", help="train perception too")
     parser.add_argument("--weights", type=Path, help="folder with trained weights (the shipped ones)")
     parser.add_argument("--evaluate", action="store_true", help="only replay the shipped policy")
@@ -71,19 +75,15 @@ def parse(argv):
 def task_module(name):
     if name not in tasks.TASKS:
         raise InputError(f"{name}: there is no such task; choose one of {', '.join(tasks.TASKS)}.")
-    return import_module(f"tasks.{name}")
-
-
-def task_id(name):
-    return f"LbW-{name.capitalize()}-v0"
+    return tasks.module(name)
 
 
 def record(name):
     """Film 15 expert videos and one of random motion; demonstration and random have Table I's frames."""
     recipe = task_module(name).RECIPE
-    folder = VIDEOS / name
+    folder = tasks.VIDEOS / name
     folder.mkdir(parents=True, exist_ok=True)
-    env = gym.make(task_id(name), embodiment="human").unwrapped
+    env = gym.make(tasks.id_of(name), embodiment="human").unwrapped
     seed, films = 0, []
     while len(films) < EXPERTS:
         film, _, done = record_expert(env, seed)
@@ -100,22 +100,24 @@ def run(args):
     """One task, from its human video to its report."""
     name, module = args.what, task_module(args.what)
     recipe = dataclasses.replace(module.RECIPE, **FAST) if args.fast else module.RECIPE
+    if args.reward == "literal" and args.without:
+        raise InputError(f"--without {args.without}: the literal reward has no mends; leave one of the two.")
     pick_device(args.device)  # say so before anything else if there is none
     torch.set_num_threads(args.threads or os.cpu_count())
     from_scratch = args.from_scratch or args.fast or args.video is not None
 
     # Look at everything the user gave before anything is written.
-    clip = args.video or VIDEOS / name / "expert_01.mp4"
+    clip = args.video or tasks.VIDEOS / name / "expert_01.mp4"
     demo, warnings = video.read(clip)
     for warning in warnings:
         print(f"warning: {warning}", file=sys.stderr)
-    random = demo[:0] if args.video else video.read(VIDEOS / name / "random.mp4")[0]
-    perception = None if from_scratch else load_perception(args.weights or WEIGHTS / name, name)
-    policy = (args.weights or WEIGHTS / name) / "policy.safetensors"
+    random = demo[:0] if args.video else video.read(tasks.VIDEOS / name / "random.mp4")[0]
+    perception = None if from_scratch else load_perception(args.weights or tasks.WEIGHTS / name, name)
+    policy = (args.weights or tasks.WEIGHTS / name) / "policy.safetensors"
     if args.evaluate:
         sac.load(policy)
     settings = {
-        "task": name, "seed": args.seed, "reward": args.reward, "fast": args.fast,
+        "task": name, "seed": args.seed, "reward": args.reward, "without": args.without, "fast": args.fast,
         "from_scratch": from_scratch, "video": hashlib.sha256(demo.tobytes()).hexdigest()[:16],
     }  # fmt: skip
     out = prepare_folder(args.out or Path("runs") / name, settings, args.resume)
@@ -128,7 +130,7 @@ def run(args):
     here.metrics["machine"] = f"{platform.machine()}, {os.cpu_count()} cores, torch {torch.__version__}"
 
     start = time.monotonic()
-    films = gym.make(task_id(name)).unwrapped
+    films = gym.make(tasks.id_of(name)).unwrapped
     frames = recipe.robot_frames if from_scratch else min(400, recipe.robot_frames)
     robot, _ = record_random(films, frames, seed=args.seed)
     here.metrics["stages"]["robot_video"] = round(time.monotonic() - start, 1)
@@ -139,12 +141,13 @@ def run(args):
             demo, random, robot, recipe, task=name, seed=args.seed, run=here, device=args.device
         )
     torch.set_num_threads(1)  # SAC's networks are small: a second thread costs more than it brings
-    env = gym.make(task_id(name), jitter=JITTER)
-    agent, env = imitate(env, demo, robot, perception, recipe, seed=args.seed, run=here, form=args.reward)
+    env = gym.make(tasks.id_of(name), jitter=JITTER)
+    agent, env = imitate(env, demo, robot, perception, recipe, seed=args.seed, run=here, form=args.reward,
+                          without=args.without)  # fmt: skip
 
     # The probe films the simulated human, whom a perception trained on another video never saw.
     if from_scratch and args.video is None and "perception" not in here.metrics:
-        here.metrics["perception"] = probe(task_id(name), perception, PROBE_SEED + args.seed)
+        here.metrics["perception"] = probe(tasks.id_of(name), perception, PROBE_SEED + args.seed)
 
     episodes, first, scene = evaluate(agent, env, 2 if args.fast else TEST_EPISODES)
     here.metrics["episodes"] = episodes
@@ -202,17 +205,16 @@ def evaluate(agent, env, n):
         base = env.unwrapped
         recorder = None
         if i == 0:
-            base.world.show_table(True)
-            recorder = Recorder(base.world.client)
-            base.world.show_table(False)
+            recorder = mirror(base)
         film, zs, parts, done, hits = [], [z], [], False, []
+        shown = env.get_wrapper_attr("keypoint_reward").episode  # the rest of a long horizon is standing
         if recorder:
             recorder.snap()
         while not done:
             z, _, terminated, truncated, info = env.step(agent.act(z, deterministic=True))
             done = terminated or truncated
             hits.append(info["is_success"])
-            if recorder:
+            if recorder and len(film) < shown:
                 film.append(base.world.render())
                 zs.append(z)
                 parts.append(info["reward_parts"])
@@ -232,6 +234,12 @@ def main(argv=None):
             if args.task is None:
                 raise InputError(f"record: name the task to film; one of {', '.join(tasks.TASKS)}.")
             record(args.task)
+        elif args.what in ("table", "ablation"):
+            results = import_module("tasks.table")
+            print(getattr(results, args.what)(args.out or Path("runs/table"), args.jobs))
+        elif args.what == "gallery":
+            page = import_module("tasks.gallery").write(args.out or Path("runs/gallery"))
+            print(f"gallery: {page}")
         elif args.what == "bench":
             import_module("tasks.bench").main()
         else:

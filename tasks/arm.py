@@ -18,7 +18,6 @@ import numpy as np
 import pybullet_data
 
 KP = 400.0  # 1/s^2, stiffness per unit of mass: the tip's natural frequency is sqrt(KP) = 20 rad/s
-KD = 2 * np.sqrt(KP)  # 1/s, critical damping
 FRICTION = 0.4  # of gripper and hand: rougher ones stick to a pushed object and tip it over
 KP_POSTURE = 10.0  # 1/s^2, pull towards the rest posture, in the nullspace of the tip's motion
 
@@ -177,11 +176,13 @@ TIP = {"robot": "panda_grasptarget", "human": "tip"}
 class Arm:
     """One arm in a PyBullet client, its tip driven by the Operational Space Controller.
 
-    `goal` is the tip's goal position in metres; the orientation goal is always straight down.
+    `goal` is the tip's goal position in metres; the orientation goal is always straight down. kp is the
+    stiffness in 1/s^2.
     """
 
-    def __init__(self, client, embodiment: str):
+    def __init__(self, client, embodiment: str, kp: float = KP):
         self.p, self.spec = client, ARMS[embodiment]()
+        self.kp, self.kd = kp, 2 * np.sqrt(kp)  # critically damped
         files = Path(tempfile.mkdtemp(prefix="lbw_arm_"))  # kept while we live: the viewer reads meshes
         weakref.finalize(self, shutil.rmtree, files, ignore_errors=True)
         for name, text in {"arm.urdf": self.spec.urdf, **self.spec.meshes}.items():
@@ -272,9 +273,9 @@ class Arm:
         F = J.T @ Lambda  # (7, 6), acceleration of the tip -> joint torque
         NT_M = M - F @ J  # (7, 7) = N^T M, as M_inv_JT^T M = J
         h = np.array(self.p.calculateInverseDynamics(self.body, list(q), list(dq), self._zeros))
-        self._Kq = KP * F @ J + KP_POSTURE * NT_M
-        self._Kd = KD * F @ J + 2 * np.sqrt(KP_POSTURE) * NT_M
-        self._bias = h + KP * F @ (self._error(self.goal) + J @ q) + KP_POSTURE * NT_M @ self.home
+        self._Kq = self.kp * F @ J + KP_POSTURE * NT_M
+        self._Kd = self.kd * F @ J + 2 * np.sqrt(KP_POSTURE) * NT_M
+        self._bias = h + self.kp * F @ (self._error(self.goal) + J @ q) + KP_POSTURE * NT_M @ self.home
 
     def actuate(self) -> None:
         """Send the torques for the next simulation step; Bullet forgets them after each."""

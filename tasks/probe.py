@@ -11,7 +11,7 @@ import gymnasium as gym
 import numpy as np
 
 from lbw_minimal.transporter import pixel_error, r2
-from tasks.world import record_expert, record_random
+from tasks.world import SIZE, record_expert, record_random
 
 NAMES = ("tip_x", "tip_y", "object_x", "object_y")
 
@@ -26,11 +26,11 @@ def probe(task_id: str, perception, seed: int, frames: int = 400) -> dict:
     """
     robot = gym.make(task_id, embodiment="robot").unwrapped
     human = gym.make(task_id, embodiment="human").unwrapped
-    film, truth = record_random(robot, 2 * frames, seed)
+    film, truth = in_picture(*record_random(robot, 2 * frames, seed))
     z = perception.detect(film)
-    v, v_truth = record_random(human, frames, seed + 1)
+    v, v_truth = in_picture(*record_random(human, frames, seed + 1))
     z_v = perception.detect(perception.translate(v))
-    half = frames // 2
+    frames, half = len(film) // 2, len(v) // 2
     sets = {
         "robot": (z[:frames], truth[:frames], z[frames:], truth[frames:]),
         "translated": (z_v[:half], v_truth[:half], z_v[half:], v_truth[half:]),
@@ -52,6 +52,12 @@ def probe(task_id: str, perception, seed: int, frames: int = 400) -> dict:
         out["contact_px"] = {"demonstration": gap(pixels(perception.z_E)), "robot": gap(pixels(expert))}
     out["keypoint_std"] = np.round(z.reshape(len(z), -1).std(0), 3).tolist()
     return out
+
+
+def in_picture(film, truth):
+    """What shows tip and object: a puck may slide out of the picture."""
+    seen = ((truth > 0) & (truth < SIZE)).all(1)
+    return film[seen], truth[seen]
 
 
 def gap(px):

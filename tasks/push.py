@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from lbw_minimal.imitate import Recipe
-from tasks.world import GREEN, RED, TaskEnv
+from tasks.world import FINGER, GREEN, RED, Leg, TaskEnv
 
 HORIZON = 50  # control steps: 2 s
 CUBE = 0.05  # m, edge
@@ -19,25 +19,23 @@ CUBE_START = 0.53  # m, along x
 TARGET = 0.68  # m, along x: 15 cm further
 SCATTER = (0.50, 0.70)  # m, where random data puts the cube
 SUCCESS = 0.05  # m, distance from cube to target
-FINGER = 0.012  # m, half the thickness of gripper and fingers: what the tip stands behind the cube's face
 
 
 class Push(TaskEnv):
     __doc__ = __doc__
     CONTACT = CUBE / 2 + FINGER
 
+    def furnish(self):
+        self.world.cylinder(0.03, 0.001, (TARGET, 0, 0.0005), GREEN, solid=False)
+
     def build(self):
         self.cube = self.world.box((CUBE / 2,) * 3, (CUBE_START, 0, CUBE / 2), RED, mass=CUBE_MASS)
         self.world.p.changeDynamics(self.cube, -1, lateralFriction=CUBE_FRICTION)
-        self.world.cylinder(0.03, 0.001, (TARGET, 0, 0.0005), GREEN, solid=False)
 
     def place(self, offset, scatter):
         position = np.array([CUBE_START, 0, CUBE / 2]) + offset
         if scatter:
-            tip = self.arm.goal[0]
-            position[0] = self.np_random.uniform(*SCATTER)
-            if abs(position[0] - tip) < CUBE / 2 + 2 * FINGER and self.arm.goal[2] < CUBE + 0.02:
-                position[0] = SCATTER[0] if tip > sum(SCATTER) / 2 else SCATTER[1]
+            position[0] = self.free_x(SCATTER, CUBE / 2, CUBE)
         self.world.p.resetBasePositionAndOrientation(self.cube, position, (0, 0, 0, 1))
 
     def object_position(self):
@@ -53,9 +51,9 @@ class Push(TaskEnv):
         behind = self.object_position()[0] - self.CONTACT - 0.025
         end = np.array([TARGET - self.CONTACT, 0, 0.02])
         return [
-            (np.array([behind, 0, 0.02]), 0.6),
-            (end, 0.8),
-            (end, 0.2),  # the tip lags its goal by 2 / 20 s
+            Leg(np.array([behind, 0, 0.02]), 0.6),
+            Leg(end, 0.8),
+            Leg(end, 0.2),  # the tip lags its goal by 2 / 20 s
         ]
 
 

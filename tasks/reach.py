@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from lbw_minimal.imitate import Recipe
-from tasks.world import GREEN, TaskEnv
+from tasks.world import GREEN, Leg, TaskEnv
 
 HORIZON = 50  # control steps: 2 s
 RADIUS = 0.018  # m, the ball that marks the target; it cannot be touched
@@ -20,8 +20,8 @@ SUCCESS = 0.05  # m, distance from tip to target
 class Reach(TaskEnv):
     __doc__ = __doc__
 
-    def build(self):
-        self.ball = self.world.sphere(RADIUS, TARGET, GREEN, solid=False)
+    def furnish(self):
+        self.world.sphere(RADIUS, TARGET, GREEN, solid=False)
 
     def place(self, offset, scatter):
         """The target stands still, in random data too: only the arm moves in this task."""
@@ -36,7 +36,7 @@ class Reach(TaskEnv):
         return np.linalg.norm(self.arm.tip_pose()[0] - TARGET) < SUCCESS
 
     def waypoints(self):
-        return [(np.array(TARGET), 1.0)]
+        return [Leg(np.array(TARGET), 1.0), Leg(np.array(TARGET), 0.2)]  # the tip lags its goal by 2 / 20 s
 
 
 RECIPE = Recipe(human_frames=1056, robot_frames=3150)

@@ -23,6 +23,7 @@ from meshcat import geometry as g
 from meshcat.animation import Animation, AnimationClip, AnimationTrack
 
 from lbw_minimal.training import write_atomic
+from tasks.world import TaskEnv
 
 EYE, TARGET = (0.5, -1.2, 0.45), (0.42, 0.0, 0.22)  # m, from the side, like the environments' camera
 FOV = 46  # degrees, from bottom to top: the whole arm, where the environments' camera frames the skill
@@ -153,7 +154,7 @@ class Recorder:
     """
 
     def __init__(self, client: int, bodies=None):
-        self.client = client
+        self.client, self.eye, self.target = client, EYE, TARGET  # m: where one looks from, and at
         self.frames = []  # an array (L, 7) each: position in m and quaternion (x, y, z, w) of every link
         self.shapes = []  # (link's row, geometry, 4x4 place in the link's frame, rgba)
         self.links = []  # (body, link) with something to draw; the base is link -1
@@ -181,10 +182,10 @@ class Recorder:
         inertial = p.getDynamicsInfo(body, -1, self.client)[3:5]
         return p.multiplyTransforms(*mass, *p.invertTransform(*inertial))
 
-    def html(self, title: str, fps: float = 25, eye=EYE, target=TARGET) -> str:
+    def html(self, title: str, fps: float = 25) -> str:
         """A page that needs nothing else: the recorded frames, `fps` a second, over and over.
 
-        eye, target: where the camera stands and looks, in m. Without a `snap` the scene stands as it is now.
+        Without a `snap` the scene stands as it is now.
         """
         if not self.frames:
             self.snap()
@@ -226,13 +227,25 @@ class Recorder:
             meshcat=(dist / "main.min.js").read_text(),
             commands=[base64.b64encode(pack(c)).decode() for c in tape],
             fov=FOV,
-            eye=y_up(eye),
-            target=y_up(target),
+            eye=y_up(self.eye),
+            target=y_up(self.target),
         )
 
     def save(self, path: Path | str, title: str = "PyBullet scene", **options) -> None:
         """Write `html(title, **options)` to a file, whole or not at all."""
         write_atomic(path, self.html(title, **options))
+
+
+def mirror(env) -> Recorder:
+    """A recorder of a task's environment, scenery included, that frames what its camera does and the arm."""
+    env.world.show_scenery(True)
+    recorder = Recorder(env.world.client)
+    env.world.show_scenery(False)
+    wider = env.CAMERA[1] / TaskEnv.CAMERA[1]
+    aside = np.array([env.CAMERA[0][0] - TaskEnv.CAMERA[0][0], 0, 0])
+    recorder.eye = np.array(EYE) * (1, wider, wider) + aside
+    recorder.target = np.array(TARGET) + aside
+    return recorder
 
 
 def pack(command) -> bytes:

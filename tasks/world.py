@@ -10,6 +10,7 @@ import contextlib
 import ctypes
 import os
 import sys
+from typing import NamedTuple
 
 import cv2
 import gymnasium as gym
@@ -37,17 +38,18 @@ with _silence():
     import pybullet
     from pybullet_utils.bullet_client import BulletClient
 
-from tasks.arm import Arm  # noqa: E402 (after the silenced import)
+from tasks.arm import KP, Arm  # noqa: E402 (after the silenced import)
 
 SIZE = 84  # pixels, both sides of every frame
 SUPERSAMPLE = 2  # the renderer does not smooth edges; averaging lets a frame show motion below a pixel
 DT = 1 / 250  # s, one simulation step
 SUBSTEPS = 10  # simulation steps per control step: 25 Hz
 TABLE_FRICTION = 1.0  # Bullet multiplies it with the object's own
+FINGER = 0.012  # m, half the thickness of gripper and fingers: what the tip stands behind a thing it pushes
 
-# Tight framing: half a metre fills the image, so a 5 cm object is 8 pixels wide.
-CAMERA_TARGET, CAMERA_DISTANCE = (0.56, 0.0, 0.145), 1.15  # m
 CAMERA_PITCH, CAMERA_FOV = -12.0, 25.0  # degrees
+
+LOW = 0.035  # m above the lowest tip: here a tip beside an object touches it
 
 RED, GREEN = (0.78, 0.12, 0.10, 1), (0.15, 0.60, 0.25, 1)
 # Middle tones: a tanh decoder saturates on white, and translation swaps extreme wall and table tones.
@@ -57,74 +59,130 @@ LOOKS = {
 }
 
 
-class World:
-    """One PyBullet client with wall and table, its camera, and the shapes tasks are built from."""
+class Leg(NamedTuple):
+    """A leg of the expert's way: the tip is at `end` (m) after `seconds`."""
 
-    def __init__(self, embodiment: str):
+    end: np.ndarray
+    seconds: float
+    dosed: bool = False  # its speed decides: a human's leg that is never bent, slower, or followed by a rest
+
+
+class World:
+    """One PyBullet client with wall and table, its camera, and the shapes tasks are built from.
+
+    camera: the point it looks at, in m, and its distance from there.
+    """
+
+    def __init__(self, embodiment: str, camera: tuple[tuple[float, float, float], float]):
         with _silence():
             self.p = BulletClient(connection_mode=pybullet.DIRECT)
         self.client = self.p._client  # PyBullet's number for it
         look = LOOKS[embodiment]
         self.p.setGravity(0, 0, -9.81)
         self.p.setPhysicsEngineParameter(fixedTimeStep=DT, deterministicOverlappingPairs=1)
-        self.table = self.box((0.50, 0.30, 0.02), (0.66, 0, -0.02), look["table"])
+        self.table = self.box((0.80, 0.30, 0.02), (0.80, 0, -0.02), look["table"])
         self.p.changeDynamics(self.table, -1, lateralFriction=TABLE_FRICTION)
         self.view = self.p.computeViewMatrixFromYawPitchRoll(
-            CAMERA_TARGET, CAMERA_DISTANCE, yaw=0, pitch=CAMERA_PITCH, roll=0, upAxisIndex=2
+            *camera, yaw=0, pitch=CAMERA_PITCH, roll=0, upAxisIndex=2
         )
         self.projection = self.p.computeProjectionMatrixFOV(CAMERA_FOV, 1.0, 0.3, 3.0)
         self.light = look["light"]
-        # Wall and table never change and nothing is behind them: painted once, then only what moves is
-        # rendered, which takes half the time.
-        shade = np.linspace(1.06, 0.94, SIZE * SUPERSAMPLE)[:, None, None]  # lighter near the ceiling
-        self.backdrop = np.uint8(shade * look["wall"][:3] * 255)
-        self.backdrop = self._composite()
-        self.show_table(False)
+        size = SIZE * SUPERSAMPLE
+        shade = np.linspace(1.06, 0.94, size)[:, None, None]  # lighter near the ceiling
+        self.backdrop = np.uint8(np.broadcast_to(shade * look["wall"][:3] * 255, (size, size, 3)))
+        self.depth = np.full((size, size), 0.999, np.float32)  # 1 is where nothing is
 
-    def show_table(self, visible: bool) -> None:
-        """Show the table to whoever reads the scene, as the 3-D viewer does, or leave it to the backdrop."""
-        rgba = (*self.p.getVisualShapeData(self.table)[0][7][:3], float(visible))
-        self.p.changeVisualShape(self.table, -1, rgbaColor=rgba)
+    def paint(self) -> None:
+        """Take what has been built so far as scenery: it is rendered now, with its depth, and never again."""
+        self.scenery = [self.p.getBodyUniqueId(i) for i in range(self.p.getNumBodies())]
+        self.backdrop, self.depth = self._composite()
+        self.show_scenery(False)
+
+    def show_scenery(self, visible: bool) -> None:
+        """Show the scenery to whoever reads the scene, like the 3-D viewer, or leave it to the backdrop."""
+        for body in self.scenery:
+            rgba = (*self.p.getVisualShapeData(body)[0][7][:3], float(visible))
+            self.p.changeVisualShape(body, -1, rgbaColor=rgba)
 
     def box(self, half, position, rgba, mass=0.0, solid=True) -> int:
         """Add a box of half extents `half`; static where `mass` (kg) is 0, untouchable if not solid."""
-        return self._body(self.p.GEOM_BOX, {"halfExtents": half}, {}, position, rgba, mass, solid)
+        return self._body("box", half, position, rgba, mass, solid)
 
     def cylinder(self, radius, height, position, rgba, mass=0.0, solid=True) -> int:
         """Add an upright cylinder."""
-        return self._body(
-            self.p.GEOM_CYLINDER, {"radius": radius, "length": height}, {"radius": radius, "height": height},
-            position, rgba, mass, solid,
-        )  # fmt: skip
+        return self._body("cylinder", (radius, height), position, rgba, mass, solid)
 
     def sphere(self, radius, position, rgba, mass=0.0, solid=True) -> int:
         """Add a ball."""
-        return self._body(self.p.GEOM_SPHERE, {"radius": radius}, {}, position, rgba, mass, solid)
+        return self._body("sphere", (radius,), position, rgba, mass, solid)
 
-    def _body(self, kind, look, touch, position, rgba, mass, solid):
-        visual = self.p.createVisualShape(kind, rgbaColor=rgba, specularColor=(0, 0, 0), **look)
-        collision = self.p.createCollisionShape(kind, **(touch or look)) if solid else -1
+    def _body(self, kind, size, position, rgba, mass, solid):
+        visual, collision = self._shapes(kind, size, rgba, solid)
         body = self.p.createMultiBody(mass, collision, visual, position)
-        # Bullet's default damping of 0.04 would brake a sliding object besides friction.
-        self.p.changeDynamics(body, -1, linearDamping=0, angularDamping=0)
+        self._undamp(body)
         return body
+
+    def assembly(self, parts, position, slides=None) -> int:
+        """Add one movable body of several parts (kind, size, place, rgba, mass, solid), fixed to each other.
+
+        kind and size as above, place relative to `position`. With `slides`, an axis, the whole hangs on a
+        prismatic joint, number 0, of a base that stands fast.
+        """
+        shapes = [self._shapes(kind, size, rgba, solid) for kind, size, _, rgba, _, solid in parts]
+        visual, collision = ([pair[i] for pair in shapes] for i in (0, 1))
+        place, mass = [part[2] for part in parts], [part[4] for part in parts]
+        base = (0, -1, -1) if slides else (mass.pop(0), collision.pop(0), visual.pop(0))
+        if not slides:
+            position, first = np.add(position, place[0]), place.pop(0)
+            place = [np.subtract(x, first) for x in place]
+        n, joints = len(mass), [self.p.JOINT_FIXED] * len(mass)
+        parents = [0] * n
+        if slides:
+            joints[0], parents[1:] = self.p.JOINT_PRISMATIC, [1] * (n - 1)
+            place[1:] = [np.subtract(x, place[0]) for x in place[1:]]
+        body = self.p.createMultiBody(
+            *base, basePosition=position, linkMasses=mass, linkCollisionShapeIndices=collision,
+            linkVisualShapeIndices=visual, linkPositions=place, linkOrientations=[(0, 0, 0, 1)] * n,
+            linkInertialFramePositions=[(0, 0, 0)] * n, linkInertialFrameOrientations=[(0, 0, 0, 1)] * n,
+            linkParentIndices=parents, linkJointTypes=joints, linkJointAxis=[slides or (0, 0, 1)] * n,
+        )  # fmt: skip
+        self._undamp(body)
+        return body
+
+    def _shapes(self, kind, size, rgba, solid):
+        p = self.p
+        kind, look, touch = {
+            "box": lambda half: (p.GEOM_BOX, {"halfExtents": half}, {"halfExtents": half}),
+            "cylinder": lambda s: (
+                p.GEOM_CYLINDER, {"radius": s[0], "length": s[1]}, {"radius": s[0], "height": s[1]},
+            ),
+            "sphere": lambda s: (p.GEOM_SPHERE, {"radius": s[0]}, {"radius": s[0]}),
+        }[kind](size)  # fmt: skip
+        visual = p.createVisualShape(kind, rgbaColor=rgba, specularColor=(0, 0, 0), **look)
+        return visual, p.createCollisionShape(kind, **touch) if solid else -1
+
+    def _undamp(self, body):
+        # Bullet's default damping of 0.04 would brake a sliding object besides friction.
+        for link in range(-1, self.p.getNumJoints(body)):
+            self.p.changeDynamics(body, link, linearDamping=0, angularDamping=0, jointDamping=0)
 
     def render(self) -> np.ndarray:
         """The camera's picture, (84, 84, 3) uint8 RGB."""
-        return cv2.resize(self._composite(), (SIZE, SIZE), interpolation=cv2.INTER_AREA)
+        return cv2.resize(self._composite()[0], (SIZE, SIZE), interpolation=cv2.INTER_AREA)
 
     def _composite(self):
-        """What moves, rendered over the backdrop at SUPERSAMPLE times the size."""
+        """What moves, rendered over the backdrop at SUPERSAMPLE times the size, and the depth of it all."""
         size = SIZE * SUPERSAMPLE
         _, _, rgba, depth, _ = self.p.getCameraImage(
             size, size, self.view, self.projection, lightDirection=self.light, shadow=0,
             lightAmbientCoeff=0.65, lightDiffuseCoeff=0.35, lightSpecularCoeff=0.0,
             renderer=self.p.ER_TINY_RENDERER, flags=self.p.ER_NO_SEGMENTATION_MASK,
         )  # fmt: skip
-        seen = np.asarray(depth).reshape(size, size) < 0.999
-        picture = np.array(np.broadcast_to(self.backdrop, (size, size, 3)))
+        depth = np.asarray(depth, np.float32).reshape(size, size)
+        seen = depth < self.depth
+        picture = self.backdrop.copy()
         picture[seen] = np.asarray(rgba, np.uint8).reshape(size, size, 4)[seen, :3]
-        return picture
+        return picture, np.minimum(depth, self.depth)
 
     def pixel(self, point) -> np.ndarray:
         """Where a world point (m) appears in the image: (x right, y down) in pixels."""
@@ -151,6 +209,8 @@ class TaskEnv(gym.Env):
     # How far, in m, the goal may run ahead of the tip. Keypoints do not show the goal, so what it keeps
     # back is hidden from the policy: with 0.05 instead of 0.03, 6,000 steps of SAC solve push in no episode.
     LEASH = 0.03
+    CAMERA = ((0.56, 0.0, 0.145), 1.15)  # m: half a metre fills the image, a 5 cm object is 8 pixels wide
+    KP = KP  # 1/s^2, stiffness of the arm's tip
     WORKSPACE = ((0.42, -0.01, 0.015), (0.74, 0.01, 0.17))  # m, box of the tip's goal
     START = (0.46, 0.0, 0.12)  # m, the tip at reset
     CONTACT = None  # m along x from tip to object when they touch; None where nothing is touched
@@ -167,17 +227,21 @@ class TaskEnv(gym.Env):
             self.observation_space = gym.spaces.Box(0, 255, (SIZE, SIZE, 3), np.uint8)
         else:
             self.observation_space = gym.spaces.Box(-np.inf, np.inf, (9,), np.float32)
-        self.world = World(embodiment)
-        self.arm = Arm(self.world.p, embodiment)
+        self.world = World(embodiment, self.CAMERA)
+        self.furnish()
+        self.world.paint()
+        self.arm = Arm(self.world.p, embodiment, self.KP)
         self.build()
         self.world.p.stepSimulation()  # a world that never stepped behaves unlike one that did
         self._fresh = self.world.p.saveState()  # contact caches too, which a reset of poses keeps
 
     # What a task file writes ------------------------------------------------------------------------
 
+    def furnish(self) -> None:
+        """Add what never moves to `self.world`."""
+
     def build(self) -> None:
-        """Add the task's objects to `self.world`."""
-        raise NotImplementedError
+        """Add what moves to `self.world`."""
 
     def place(self, offset: np.ndarray, scatter: bool) -> None:
         """Put the objects at their start, moved by `offset` (m), or anywhere if `scatter`."""
@@ -195,8 +259,8 @@ class TaskEnv(gym.Env):
         """Whether the task is done now."""
         raise NotImplementedError
 
-    def waypoints(self) -> list[tuple[np.ndarray, float]]:
-        """The expert's way from the start: (tip position in m, seconds to get there)."""
+    def waypoints(self) -> list[Leg]:
+        """The expert's way from the start."""
         raise NotImplementedError
 
     # Gymnasium --------------------------------------------------------------------------------------
@@ -215,14 +279,24 @@ class TaskEnv(gym.Env):
             self._stand_beside()
         return self._observe(), self._info()
 
+    def free_x(self, span, half, height) -> float:
+        """Anywhere in `span` (m along x) where a thing of half width and height (m) is clear of the arm."""
+        x, tip = self.np_random.uniform(*span), self.arm.goal
+        if abs(x - tip[0]) < half + 2 * FINGER and tip[2] < height + 0.02:
+            x = max(span, key=lambda end: abs(end - tip[0]))
+        return x
+
     def _stand_beside(self):
-        """Put the tip low and next to the object: a task is about contact, and chance brings little."""
-        x = self.object_position()[0]
+        """Put the tip low and next to the object, if it is in reach: a task is about contact, and chance
+        brings little."""
+        x, low, high = self.object_position()[0], self.WORKSPACE[0][0], self.WORKSPACE[1][0]
         aside = self.np_random.uniform(self.CONTACT, self.CONTACT + 0.05)
         side = self.np_random.choice([-1, 1], p=[0.65, 0.35])
-        if not self.WORKSPACE[0][0] < x + side * aside < self.WORKSPACE[1][0]:
+        if not low < x + side * aside < high:
             side = -side
-        self.arm.reset(np.array([x + side * aside, 0, self.np_random.uniform(0.015, 0.05)]))
+        if low < x + side * aside < high:
+            z = self.WORKSPACE[0][2] + self.np_random.uniform(0, LOW)
+            self.arm.reset(np.array([x + side * aside, 0, z]))
 
     def step(self, action):
         action = np.clip(np.asarray(action, float), -1, 1)
@@ -267,9 +341,9 @@ def expert_actions(env: TaskEnv, rng: np.random.Generator | None = None):
     uneven time, and sometimes end in a short pause.
     """
     start = env.arm.goal.copy()
-    for end, seconds in env.waypoints():
-        bend = np.zeros(3)
-        if rng is not None:
+    for end, seconds, dosed in env.waypoints():
+        bend, human = np.zeros(3), rng is not None and not dosed
+        if human:
             seconds *= rng.uniform(0.9, 1.15)
             bend[[0, 2]] = rng.uniform(-1, 1, 2) * 0.08 * abs(end - start)[[2, 0]]
         steps = max(1, round(seconds / (DT * SUBSTEPS)))
@@ -279,7 +353,7 @@ def expert_actions(env: TaskEnv, rng: np.random.Generator | None = None):
             wanted = start + s * (end - start) + np.sin(np.pi * s) * bend
             yield np.clip((wanted - env.arm.goal) / env.STEP, -1, 1).astype(np.float32)
         start = np.asarray(end, float)
-        if rng is not None and rng.random() < 0.4:
+        if human and rng.random() < 0.4:
             for _ in range(rng.integers(1, 4)):
                 yield np.zeros(3, np.float32)
 
@@ -310,7 +384,8 @@ def record_random(env: TaskEnv, frames: int, seed: int, take: int = 25):
         film.append(env.reset(seed=int(rng.integers(2**31)), options={"scatter": True})[0])
         truth.append(env.true_pixels())
         gap = env.object_position() - env.arm.goal
-        beside = env.CONTACT and abs(gap[0]) < env.CONTACT + 0.05 and env.arm.goal[2] < 0.05
+        low = env.arm.goal[2] < env.WORKSPACE[0][2] + LOW
+        beside = env.CONTACT and abs(gap[0]) < env.CONTACT + 0.05 and low
         seek, roam = random_actions(rng, np.sign(gap[0])), random_actions(rng)
         for i in range(1, take):
             film.append(env.step(next(seek if beside and i < take / 2 else roam))[0])

@@ -6,11 +6,17 @@ import numpy as np
 import pytest
 from toy_push import HALF_GRIPPER, HALF_PUCK, ToyPush, demonstration, detect, follow, random_frames
 
-from lbw_minimal.reward import KeypointReward, keypoint_noise, keypoint_weights, resample, trim_pauses
+from lbw_minimal.reward import (
+    MENDS,
+    KeypointReward,
+    keypoint_noise,
+    keypoint_weights,
+    resample,
+    trim_pauses,
+)
 from lbw_minimal.training import InputError
 
 HORIZON = ToyPush.horizon
-MENDS = ("trim", "speed", "include_goal", "weights", "timed")
 
 
 def line(*x):
@@ -47,8 +53,8 @@ def acted(*waypoints):
 
 
 def replay(toy):
-    """The demonstration acted out by the robot at its own pace, without the pauses."""
-    return acted((-0.3, 0.3, 0.7, 0), (-0.26, 0.5, 0.7, 0), (0.55 - HALF_PUCK - HALF_GRIPPER, 0.5, 0.8, 0))
+    """The demonstration acted out at its own pace, without the pauses."""
+    return acted((-0.3, 0.3, 0.35, 0), (-0.26, 0.5, 0.35, 0), (0.55 - HALF_PUCK - HALF_GRIPPER, 0.5, 0.5, 0))
 
 
 # The paper's form ---------------------------------------------------------------------------------
@@ -169,13 +175,18 @@ def test_trimming_keeps_slow_motion_that_adds_up():
     assert trim_pauses(z, 0.25)[:, 0, 0].tolist() == [0, 0.3, 0.6, 0.7]
 
 
-def test_resampling_matches_the_median_step():
-    z = resample(line(*np.linspace(0, 1, 21)), 0.1, 1000)
-    assert np.diff(z[:, 0, 0]) == pytest.approx(np.full(10, 0.1))
+def test_resampling_slows_down_what_is_too_fast():
+    z = resample(line(*np.linspace(0, 1, 11)), 0.05, 1000)
+    assert np.diff(z[:, 0, 0]) == pytest.approx(np.full(20, 0.05))
+
+
+def test_resampling_never_hurries_as_what_slides_has_a_time_of_its_own():
+    z = line(*np.linspace(0, 1, 21))
+    np.testing.assert_allclose(resample(z, 0.1, 1000), z)
 
 
 def test_resampling_keeps_a_strike_faster_than_its_approach():
-    x = resample(line(0, 0.1, 0.2, 0.3, 0.4, 0.8, 1.2), 0.05, 1000)[:, 0, 0]
+    x = resample(line(0, 0.1, 0.2, 0.3, 0.4, 0.8, 1.2), 0.2, 1000)[:, 0, 0]
     assert x[-1] - x[-2] == pytest.approx(4 * (x[1] - x[0]))
 
 

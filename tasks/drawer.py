@@ -1,0 +1,87 @@
+"""Drawer: a drawer stands open, and has to be pushed shut by its handle; it slides, but not by itself.
+
+Way, threshold and horizon follow the Meta-World drawer task the paper builds on. From top to bottom:
+constants, scene, success, the expert, the recipe.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from lbw_minimal.imitate import Recipe
+from tasks.world import FINGER, Leg, TaskEnv
+
+HORIZON = 300  # control steps: 12 s
+OPEN = 0.15  # m, the joint stands at -OPEN when open, at 0 when shut
+SHUT = -0.0315  # m: success from here on, the threshold of the original
+FRONT = 0.70  # m along x, the cabinet's face
+CABINET = (0.12, 0.20, 0.14)  # m, depth, width, height
+PANEL = (0.012, 0.16, 0.08)  # m, the drawer's front: thickness, width, height
+HANDLE = (0.03, 0.09, 0.026)  # m: how far it stands out, width, height
+REACH = PANEL[0] + HANDLE[0]  # m, the grip's way from the drawer's face
+HEIGHT = 0.065  # m, the handle's centre above the table
+DRAWER_MASS = 0.8  # kg
+RAIL_FRICTION = 18.0  # N, dry: nothing slides on by itself
+WOOD, DARK, BRASS = (0.45, 0.42, 0.30, 1), (0.30, 0.27, 0.20, 1), (0.78, 0.12, 0.10, 1)
+
+
+class Drawer(TaskEnv):
+    __doc__ = __doc__
+    STEP = 0.01  # m; with 0.03 and less friction, three of ten random episodes jolt the drawer shut
+    KP = 1600.0  # 1/s^2: at 400 the light human arm cannot overcome the friction within its leash
+    WORKSPACE = ((0.42, -0.01, 0.03), (0.70, 0.01, 0.22))
+    START = (0.45, 0.0, 0.17)
+    CONTACT = FINGER
+
+    def furnish(self):
+        depth, width, height = CABINET
+        half = depth / 2, width / 2, height / 2
+        self.cabinet = self.world.box(half, (FRONT + depth / 2, 0, height / 2), WOOD)
+
+    def build(self):
+        half = [np.array(size) / 2 for size in (PANEL, HANDLE, (OPEN, 0.8 * PANEL[1], 0.6 * PANEL[2]))]
+        self.drawer = self.world.assembly(
+            [
+                ("box", half[0], (-PANEL[0] / 2, 0, 0), WOOD, DRAWER_MASS, True),
+                ("box", half[1], (-PANEL[0] - HANDLE[0] / 2, 0, 0), BRASS, 0.05, True),
+                ("box", half[2], (OPEN / 2, 0, 0), DARK, 0.05, True),
+            ],
+            (FRONT, 0, HEIGHT),
+            slides=(1, 0, 0),
+        )
+        p = self.world.p
+        # A velocity motor that wants 0 and has a limited force is dry friction.
+        p.setJointMotorControl2(self.drawer, 0, p.VELOCITY_CONTROL, targetVelocity=0, force=RAIL_FRICTION)
+        for link in range(3):  # it slides into the cabinet
+            p.setCollisionFilterPair(self.drawer, self.cabinet, link, -1, 0)
+        p.changeDynamics(self.drawer, 0, jointLowerLimit=-OPEN, jointUpperLimit=0)
+
+    def place(self, offset, scatter):
+        q = self.np_random.uniform(-OPEN, 0) if scatter else -OPEN + abs(offset[0])
+        self.world.p.resetJointState(self.drawer, 0, q)
+        tip, top = self.arm.goal, HEIGHT + PANEL[2] / 2 + 0.02
+        if scatter and tip[0] > FRONT + q - REACH - 2 * FINGER and tip[2] < top:  # it would be in the drawer
+            self.arm.reset(np.array([self.WORKSPACE[0][0] + 0.01, 0, tip[2]]))
+
+    def object_position(self):
+        """The handle's grip, where one pushes."""
+        q = self.world.p.getJointState(self.drawer, 0)[0]
+        return np.array([FRONT + q - REACH, 0, HEIGHT])
+
+    def target_position(self):
+        return np.array([FRONT - REACH, 0, HEIGHT])
+
+    def is_success(self):
+        return self.world.p.getJointState(self.drawer, 0)[0] >= SHUT
+
+    def waypoints(self):
+        before = self.object_position() - (self.CONTACT + 0.02, 0, 0)
+        end = self.target_position() - (self.CONTACT - 0.02, 0, 0)  # the goal leads: friction takes as much
+        return [
+            Leg(before, 0.9),
+            Leg(end, 1.6),
+            Leg(end, 0.2),  # the tip lags its goal by 2 / 20 s
+        ]
+
+
+RECIPE = Recipe(human_frames=986, robot_frames=2940)

@@ -1,0 +1,100 @@
+"""One page that shows all tasks: scene, demonstration, what the robot saw in it, and the best rollout.
+
+In: the human videos and the trained weights that come with the kit. Out: `index.html` with the pictures in
+it, and beside it a scene for every task and arm that turns with the mouse, each a file of its own.
+"""
+
+from __future__ import annotations
+
+from html import escape
+from pathlib import Path
+
+import gymnasium as gym
+import numpy as np
+
+import tasks
+from lbw_minimal import sac, video
+from lbw_minimal.imitate import load_perception, watched
+from lbw_minimal.report import CSS, data_uri, demonstration, draw_keypoints, film, picture
+from lbw_minimal.training import InputError, write_atomic
+from tasks.viewer import mirror
+from tasks.world import expert_actions, record_random
+
+FPS = 25
+SEED = 0  # of the rollout that is shown: no start jitter, as in the video
+HEAD = """<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>LbW minimal: the five tasks</title>
+<style>{css}</style>
+</head>
+<body>
+<h1>The five tasks</h1>
+<p>Above in each row of pictures: frames of the one human video the robot learns from. Below: the same frames
+translated into the robot's world, with the keypoints found on them. Then what the robot learnt, and both arms
+in scenes that turn with the mouse.</p>
+"""
+
+
+def write(out: Path) -> Path:
+    """Write the gallery into the folder `out` and return its page. Raises InputError for missing weights."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{out}: cannot write there ({error.strerror}); give another --out.") from None
+    page = [HEAD.format(css=CSS)]
+    for name in tasks.TASKS:
+        demo, _ = video.read(tasks.VIDEOS / name / "expert_01.mp4")
+        perception = load_perception(tasks.WEIGHTS / name, name)
+        perception.watch(demo)
+        robot, _ = record_random(gym.make(tasks.id_of(name)).unwrapped, 400, seed=0)
+        agent = sac.load(tasks.WEIGHTS / name / "policy.safetensors")
+        env, reward = watched(gym.make(tasks.id_of(name)), perception, robot)
+        frames, z, won = rollout(
+            env, agent, min(env.spec.max_episode_steps, reward.episode), out / f"{name}-robot.html"
+        )
+        perform(gym.make(tasks.id_of(name), embodiment="human").unwrapped, out / f"{name}-human.html")
+        about = tasks.module(name).__doc__.partition("\n\n")[0]
+        shown = data_uri("image/webp", film(draw_keypoints(frames, z), FPS / 2))
+        scenes = "".join(
+            f'<iframe loading="lazy" title="{name}, {arm}" src="{name}-{arm}.html"></iframe>'
+            for arm in ("human", "robot")
+        )
+        columns = demonstration(demo, perception.translated, perception.z_E, FPS)
+        page.append(
+            f"<section><h2>{escape(about)}</h2>{columns}"
+            f'<div class="row">{picture(shown, f"The robot does it: {name}")}</div>'
+            f'<p class="small">{"It succeeds." if won else "It fails."} Half speed.</p>{scenes}</section>'
+        )
+    page.append("</body>\n</html>\n")
+    write_atomic(out / "index.html", "".join(page))
+    return out / "index.html"
+
+
+def rollout(env, agent, steps, path):
+    """Frames, keypoints and success of one episode of the policy, whose 3-D scene goes to a file."""
+    obs, _ = env.reset(seed=SEED)
+    base, K = env.unwrapped, env.get_wrapper_attr("keypoint_reward").z_E.shape[1]
+    frames, z, won, scene = [], [], False, mirror(base)
+    scene.snap()
+    for _ in range(steps):
+        obs, _, _, _, info = env.step(agent.act(obs, deterministic=True))
+        frames.append(base.world.render())
+        z.append(obs[: 2 * K].reshape(K, 2))
+        won |= info["is_success"]
+        scene.snap()
+    scene.save(path, title="The robot, as it learnt")
+    return np.stack(frames), np.stack(z), won
+
+
+def perform(env, path):
+    """The human expert's 3-D scene, to a file."""
+    env.reset(seed=0)
+    scene = mirror(env)
+    scene.snap()
+    for action in expert_actions(env, np.random.default_rng(0)):
+        env.step(action)
+        scene.snap()
+    scene.save(path, title="The human, who shows it")

@@ -1,0 +1,69 @@
+"""Slide: a puck on a slippery table has to come to rest at a target that no arm reaches: a hit, well dosed.
+
+Sizes, friction, distance and horizon follow the Fetch slide task the paper builds on. From top to bottom:
+constants, scene, success, the expert, the recipe.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from lbw_minimal.imitate import Recipe
+from tasks.world import FINGER, GREEN, RED, Leg, TaskEnv
+
+HORIZON = 300  # control steps: 12 s
+RADIUS, HEIGHT = 0.025, 0.04  # m, of the puck
+PUCK_MASS = 0.4  # kg
+PUCK_FRICTION = 0.1  # times the table's 1.0: a puck of speed v slides v^2 / (2 * 0.1 * 9.81)
+PUCK_START = 0.53  # m, along x
+TARGET = 0.95  # m, along x: 42 cm further, which asks for 0.91 m/s
+SCATTER = (0.50, 1.02)  # m, where random data puts the puck
+SUCCESS = 0.05  # m, distance from puck to target
+AT_REST = 0.02  # m/s, and slower than this
+STROKE, STROKE_TIME = 0.17, 0.40  # m, s: the expert's hit
+
+
+class Slide(TaskEnv):
+    __doc__ = __doc__
+    CAMERA = ((0.71, 0.0, 0.20), 1.58)  # m: 70 cm fill the image
+    STEP, LEASH = 0.04, 0.06  # m: 1 m/s at full action
+    KP = 1600.0  # 1/s^2: at 400 the tip lags a hit by 9 cm, which hides in the goal what the puck will do
+    WORKSPACE = ((0.42, -0.002, 0.015), (0.64, 0.002, 0.22))
+    START = (0.46, 0.0, 0.15)
+    CONTACT = RADIUS + FINGER
+
+    def furnish(self):
+        self.world.cylinder(0.03, 0.001, (TARGET, 0, 0.0005), GREEN, solid=False)
+
+    def build(self):
+        self.puck = self.world.cylinder(RADIUS, HEIGHT, (PUCK_START, 0, HEIGHT / 2), RED, mass=PUCK_MASS)
+        self.world.p.changeDynamics(self.puck, -1, lateralFriction=PUCK_FRICTION)
+
+    def place(self, offset, scatter):
+        position = np.array([PUCK_START, 0, HEIGHT / 2]) + offset
+        if scatter:
+            position[0] = self.free_x(SCATTER, RADIUS, HEIGHT)
+        self.world.p.resetBasePositionAndOrientation(self.puck, position, (0, 0, 0, 1))
+
+    def object_position(self):
+        return np.array(self.world.p.getBasePositionAndOrientation(self.puck)[0])
+
+    def target_position(self):
+        return np.array([TARGET, 0, HEIGHT / 2])
+
+    def is_success(self):
+        speed = np.linalg.norm(self.world.p.getBaseVelocity(self.puck)[0])
+        return np.linalg.norm(self.object_position() - self.target_position()) < SUCCESS and speed < AT_REST
+
+    def waypoints(self):
+        behind = self.object_position() * (1, 1, 0) + (-self.CONTACT - 0.04, 0, 0.02)
+        end = behind + (STROKE, 0, 0)
+        return [
+            Leg(behind, 0.6),
+            Leg(behind, 0.2),  # the tip lags its goal by 2 / 20 s
+            Leg(end, STROKE_TIME, dosed=True),
+            Leg(end, 1.2, dosed=True),  # the puck slides and comes to rest
+        ]
+
+
+RECIPE = Recipe(human_frames=650, robot_frames=2120)
