@@ -8,7 +8,8 @@ import pytest
 import torch
 
 from lbw_minimal import video
-from tasks.__main__ import VIDEOS, WEIGHTS, main
+from tasks import VIDEOS, WEIGHTS
+from tasks.__main__ import main
 
 
 def clip(path, frames, size=84):

@@ -1,0 +1,80 @@
+"""All scenes, both arms: the mirror in the browser stands where PyBullet has it, and the picture is whole."""
+
+import numpy as np
+import pytest
+from test_viewer import commands
+
+import tasks
+from tasks.viewer import mirror, transform
+from tasks.world import World, expert_actions, random_actions
+
+SCENES = [(name, arm) for name in tasks.TASKS for arm in ("robot", "human")]
+
+
+def make(name, arm):
+    return getattr(tasks.module(name), name.capitalize())(embodiment=arm, observation="state")
+
+
+def poses(page):
+    """What the page tells the browser of its links: {path: 4x4} and, of those that move, {path: (T, 7)}."""
+    told = commands(page)
+    still = {c["path"]: np.reshape(c["matrix"], (4, 4)).T for c in told if c["type"] == "set_transform"}
+    moving = {}
+    for part in (part for c in told for part in c.get("animations", [])):
+        tracks = {t["name"]: [k["value"] for k in t["keys"]] for t in part["clip"]["tracks"]}
+        moving[part["path"]] = np.hstack([tracks[".position"], tracks[".quaternion"]])
+    return still, moving
+
+
+@pytest.mark.parametrize(("name", "arm"), SCENES)
+def test_poses_in_the_browser_equal_pybullets_in_100_random_states(name, arm):
+    env = make(name, arm)
+    p, rng, wanted = env.world.p, np.random.default_rng(0), []
+    env.reset(seed=0)
+    scene = mirror(env)
+    for i in range(100):
+        if i % 10 == 0:
+            env.reset(seed=i, options={"scatter": True})
+            actions = random_actions(rng)
+        env.step(next(actions))
+        scene.snap()
+        wanted.append([frame(p, body, link) for body, link in scene.links])
+    page = scene.html(name)
+    still, moving = poses(page)
+    assert len(page) < 2e6
+    for row, (body, link) in enumerate(scene.links):
+        path = f"/meshcat/{body}/{link}"
+        truth = np.array([w[row] for w in wanted])
+        if path in moving:
+            told = np.array([transform(x[:3], x[3:]) for x in moving[path][:100]])
+        else:
+            told = np.broadcast_to(still[path], truth.shape)
+        np.testing.assert_allclose(told, truth, atol=1e-6)
+    env.close()
+
+
+def frame(p, body, link):
+    """4x4 URDF frame of a link, from PyBullet's centre of mass and the inertial frame in it."""
+    if link < 0:
+        mass = p.getBasePositionAndOrientation(body)
+    else:
+        mass = p.getLinkState(body, link, computeForwardKinematics=True)[:2]
+    inertial = p.getDynamicsInfo(body, link)[3:5]
+    return transform(*mass) @ np.linalg.inv(transform(*inertial))
+
+
+@pytest.mark.parametrize(("name", "arm"), SCENES)
+def test_painting_the_scenery_once_changes_no_pixel(name, arm, monkeypatch):
+    """The same episode rendered with everything in the scene: the depth keeps what is in front in front."""
+    fast = make(name, arm)
+    monkeypatch.setattr(World, "paint", lambda world: None)
+    full = make(name, arm)
+    for env in (fast, full):
+        env.reset(seed=3)
+    for action in expert_actions(fast, np.random.default_rng(0)):
+        fast.step(action)
+        full.step(action)
+    difference = np.abs(fast.world.render().astype(int) - full.world.render())
+    assert (difference > 2).mean() < 1e-3
+    fast.close()
+    full.close()

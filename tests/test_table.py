@@ -1,0 +1,76 @@
+"""The tables: figures worked out by hand, finished runs left alone, failed ones named."""
+
+import json
+
+import pytest
+
+from lbw_minimal.training import InputError
+from tasks import table
+
+
+def finish(path, wins, episodes=10, **more):
+    """The metrics of a finished run in the folder `path`."""
+    path.mkdir(parents=True)
+    rows = [{"success": i < wins, "success_at_end": i < wins - 1} for i in range(episodes)]
+    scores = {n: {"r2": 0.99, "px": 1.0} for n in ("tip_x", "tip_y", "object_x")}
+    scores["object_y"] = {"r2": None, "px": 0.1}
+    metrics = {
+        "episodes": rows, "success": {}, "stages": {"translation": 300, "policy": 60}, "memory_mb": 800,
+        "settings": {"recipe": {"policy_steps": 10_000}},
+        "perception": {"robot": scores, "translated": scores},
+    }  # fmt: skip
+    (path / "metrics.json").write_text(json.dumps(metrics | more))
+
+
+@pytest.fixture
+def runs(tmp_path, monkeypatch):
+    monkeypatch.setattr("tasks.TASKS", ("push", "slide"))
+    for task, wins in (("push", (10, 10, 9)), ("slide", (8, 7, 9))):
+        for seed, n in enumerate(wins):
+            finish(table.folder(tmp_path, task, seed), n)
+            for change in ("literal", *table.MENDS):
+                finish(table.folder(tmp_path, task, seed, change), 0)
+    return tmp_path
+
+
+def test_row_has_the_rate_of_all_seeds_and_its_interval(runs):
+    text = table.table(runs, jobs=1)
+    # 29 of 30: Wilson 83.3 to 99.4 %; 24 of 30: 62.7 to 90.5 %; 0 of 30: 0 to 11.4 %
+    assert "| push | 100 % | 97 % (83-99) | 10/10, 10/10, 9/10 | 0 % (0-11) | 0/10, 0/10, 0/10 |" in text
+    assert "| slide | 80 % | 80 % (63-90) | 8/10, 7/10, 9/10 |" in text
+    assert "| 6 min | 10,000 |" in text
+    assert "| push | 0 | 0.990 / 0.990 / 0.990 / - | 0.990 / 0.990 / 0.990 / - |" in text
+    assert (runs / "table.md").read_text() == text
+    rows = json.loads((runs / "table.json").read_text())
+    assert len(rows) == 12 and rows[0]["wins"] == 10 and rows[0]["wins_at_end"] == 9
+
+
+def test_ablation_has_a_row_a_mend_and_a_picture(runs):
+    text = table.ablation(runs, jobs=1)
+    assert len(text.splitlines()) == 2 + 2 + len(table.MENDS)
+    assert "| without timed | 0 % (0-11) | 0/10, 0/10, 0/10 |" in text
+    assert (runs / "ablation.png").stat().st_size > 5000
+
+
+def test_finished_runs_are_not_repeated_and_others_go_on(tmp_path, monkeypatch):
+    finish(tmp_path / "push-0", 10)
+    (tmp_path / "push-1").mkdir()
+    (tmp_path / "push-1" / "settings.json").write_text("{}")
+    started = []
+
+    def run(line, **_):
+        started.append(line[3:])
+        return type("Done", (), {"returncode": 0})
+
+    monkeypatch.setattr("subprocess.run", run)
+    table.run_missing(tmp_path, [("push", 0, "literal"), ("push", 1, "")], jobs=1)
+    assert [" ".join(line).replace(f"{tmp_path}/", "") for line in started] == [
+        "push --seed 1 --threads 1 --out push-1 --from-scratch --resume",
+        "push --seed 0 --threads 1 --out push-0-literal --weights push-0 --reward literal",
+    ]
+
+
+def test_a_run_that_fails_is_named(tmp_path, monkeypatch):
+    monkeypatch.setattr("subprocess.run", lambda *a, **k: type("Done", (), {"returncode": 2}))
+    with pytest.raises(InputError, match=r"push-0.*code 2"):
+        table.run_missing(tmp_path, [("push", 0, "")], jobs=1)
