@@ -127,15 +127,15 @@ def test_the_actor_is_trained_with_alpha():
     assert spread[1] > spread[0] + 0.1
 
 
-def test_alpha_rises_when_entropy_is_below_minus_the_number_of_actions():
-    """Three actions with entropy -2: above -3, so alpha falls; -A/2 = -1.5 would make it rise."""
+def test_alpha_rises_when_entropy_is_below_its_target():
+    """Three actions have the target -6; entropy -5 is above it, so alpha falls, and -8 below."""
     sac = SAC(3, 3, width=16)
-    log_pi = torch.full((8,), 2.0)
+    log_pi = torch.full((8,), 5.0)
     sac.actor.sample = lambda s: (sac.actor(s)[0].tanh(), log_pi)
     before = sac.alpha
     sac.update(batch_of(action_dim=3))
     assert sac.alpha < before
-    log_pi[:] = 4.0
+    log_pi[:] = 8.0
     before = sac.alpha
     for _ in range(20):
         sac.update(batch_of(action_dim=3))
@@ -231,6 +231,29 @@ def test_the_log_has_reward_parts_losses_and_evaluations():
         log[-1]
     )
     assert [("test" in row) for row in log] == [False, True, False, True] and len(seen) == 2
+
+
+def test_the_best_actor_of_a_training_stays(monkeypatch):
+    """Returns rise for 12 episodes and then fall: the actor that is kept is that of the twelfth."""
+    import lbw_minimal.sac as module
+
+    class Tide(Walk):
+        def step(self, action):
+            obs, _, terminal, late, info = super().step(action)
+            return obs, -abs(self.episode - 12.0), terminal, late, info
+
+        def reset(self, seed=None, options=None):
+            self.episode = getattr(self, "episode", 0) + 1
+            return super().reset(seed=seed)
+
+    monkeypatch.setattr(module, "WINDOW", 1)
+    recipe = dict(seed=0, random_steps=20, width=8, batch=8)
+    kept, log = train(Tide(), steps=400, **recipe)
+    assert len(log) == 20 and max(log, key=lambda row: row["return"])["episode"] == 11
+    stopped, _ = train(Tide(), steps=240, **recipe)
+    for p, q in zip(kept.test_actor.parameters(), stopped.test_actor.parameters(), strict=True):
+        assert torch.equal(p, q)
+    assert not torch.equal(kept.actor.net[0].weight, stopped.actor.net[0].weight)
 
 
 def test_it_learns_to_stand_at_the_right_place():
