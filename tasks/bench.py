@@ -15,7 +15,7 @@ import torch
 from gymnasium.utils.performance import benchmark_step
 
 from lbw_minimal import munit, sac, transporter
-from tasks import TASKS
+from tasks import TASKS, id_of
 
 SECONDS = 5  # per figure
 
@@ -54,17 +54,18 @@ class PandaGymPush(gym.Wrapper):
 
 def main():
     torch.set_num_threads(1)
+    speed = {}
     for task in TASKS:
         for mode in ("state", "rgb"):
-            env = gym.make(f"LbW-{task.capitalize()}-v0", observation=mode)
-            value = benchmark_step(env, SECONDS, seed=0)
-            show(f"{task}, {mode} observations", value, "steps/s")
+            env = gym.make(id_of(task), observation=mode)
+            speed[task, mode] = benchmark_step(env, SECONDS, seed=0)
+            show(f"{task}, {mode} observations", speed[task, mode], "steps/s")
             env.close()
-    rgb = value  # of push, the last
     if installed("panda_gym"):
         env = PandaGymPush()
         value = benchmark_step(env, SECONDS, seed=0)
-        show("panda-gym push, 84x84 frames", value, "steps/s", f"ours: {rgb / value:.1f} times")
+        ratio = f"ours: {speed['push', 'rgb'] / value:.1f} times"
+        show("panda-gym push, 84x84 frames", value, "steps/s", ratio)
         env.close()
     else:
         print("panda-gym is not installed: no comparison (pip install panda-gym)")

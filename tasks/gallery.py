@@ -22,6 +22,12 @@ from tasks.world import expert_actions, record_random
 
 FPS = 25
 SEED = 0  # of the rollout that is shown: no start jitter, as in the video
+TRIO = """
+.trio { display: grid; grid-template-columns: repeat(3, 1fr); gap: .5rem }
+.trio figure { margin: 0 }
+.trio img, .trio iframe { width: 100%; height: 17rem; object-fit: cover }
+@media (max-width: 40rem) { .trio { grid-template-columns: 1fr } }
+"""
 HEAD = """<!DOCTYPE html>
 <html lang="en">
 <head>
@@ -33,8 +39,8 @@ HEAD = """<!DOCTYPE html>
 <body>
 <h1>The five tasks</h1>
 <p>Above in each row of pictures: frames of the one human video the robot learns from. Below: the same frames
-translated into the robot's world, with the keypoints found on them. Then what the robot learnt, and both arms
-in scenes that turn with the mouse.</p>
+translated into the robot's world, with the keypoints found on them. Then both arms in scenes that turn with
+the mouse, and the robot's own view of what it learnt.</p>
 """
 
 
@@ -44,7 +50,7 @@ def write(out: Path) -> Path:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{out}: cannot write there ({error.strerror}); give another --out.") from None
-    page = [HEAD.format(css=CSS)]
+    page = [HEAD.format(css=CSS + TRIO)]
     for name in tasks.TASKS:
         demo, _ = video.read(tasks.VIDEOS / name / "expert_01.mp4")
         perception = load_perception(tasks.WEIGHTS / name, name)
@@ -56,18 +62,17 @@ def write(out: Path) -> Path:
             env, agent, min(env.spec.max_episode_steps, reward.episode), out / f"{name}-robot.html"
         )
         perform(gym.make(tasks.id_of(name), embodiment="human").unwrapped, out / f"{name}-human.html")
-        about = tasks.module(name).__doc__.partition("\n\n")[0]
         shown = data_uri("image/webp", film(draw_keypoints(frames, z), FPS / 2))
-        scenes = "".join(
-            f'<iframe loading="lazy" title="{name}, {arm}" src="{name}-{arm}.html"></iframe>'
-            for arm in ("human", "robot")
-        )
+        scenes = [
+            (f'<iframe loading="lazy" title="{name}, {arm}" src="{name}-{arm}.html"></iframe>', about)
+            for arm, about in (("human", "the human, who shows it"), ("robot", "the robot, as it learnt it"))
+        ]
+        result = "what it sees at half speed: it " + ("succeeds" if won else "fails")
+        trio = [*scenes, (picture(shown, f"The robot does it: {name}"), result)]
+        cells = "".join(f"<figure>{x}<figcaption>{caption}</figcaption></figure>" for x, caption in trio)
         columns = demonstration(demo, perception.translated, perception.z_E, FPS)
-        page.append(
-            f"<section><h2>{escape(about)}</h2>{columns}"
-            f'<div class="row">{picture(shown, f"The robot does it: {name}")}</div>'
-            f'<p class="small">{"It succeeds." if won else "It fails."} Half speed.</p>{scenes}</section>'
-        )
+        title = escape(tasks.module(name).__doc__.partition("\n\n")[0])
+        page.append(f'<section><h2>{title}</h2>{columns}<div class="trio">{cells}</div></section>')
     page.append("</body>\n</html>\n")
     write_atomic(out / "index.html", "".join(page))
     return out / "index.html"

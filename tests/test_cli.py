@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from lbw_minimal import video
-from tasks import VIDEOS, WEIGHTS
+from tasks import TASKS, VIDEOS, WEIGHTS
 from tasks.__main__ import main
 
 
@@ -96,9 +96,13 @@ def no_such_device(folder):
     return ["push", "--fast", "--device", "abacus"], "abacus"
 
 
+def literal_without_a_mend(folder):
+    return ["push", "--reward", "literal", "--without", "trim"], "trim"
+
+
 MISTAKES = (missing, text, truncated, no_frames, one_frame, tiny, still, unknown_task, unknown_task_to_film,
             no_task_to_film, nothing_to_resume, other_tasks_weights, cut_weights, no_weights, no_cuda,
-            no_such_device)  # fmt: skip
+            no_such_device, literal_without_a_mend)  # fmt: skip
 
 
 @pytest.mark.parametrize("mistake", MISTAKES, ids=lambda f: f.__name__)
@@ -116,9 +120,10 @@ def test_a_mistake_gets_one_sentence_and_leaves_no_trace(mistake, tmp_path, capf
     assert sorted(tmp_path.rglob("*")) == before
 
 
-def test_a_folder_that_cannot_be_written_is_named(tmp_path, capfd):
+@pytest.mark.parametrize("what", [["push", "--fast"], ["table"], ["ablation"], ["gallery"]])
+def test_a_folder_that_cannot_be_written_is_named(what, tmp_path, capfd):
     (tmp_path / "file").write_text("in the way")
-    assert main(["push", "--fast", "--out", str(tmp_path / "file" / "run")]) == 2
+    assert main([*what, "--out", str(tmp_path / "file" / "run")]) == 2
     assert "run: cannot write there" in capfd.readouterr().err
 
 
@@ -135,14 +140,14 @@ def test_a_folder_of_the_users_own_files_is_never_emptied(tmp_path, capfd):
 
 
 def test_every_task_has_its_videos():
-    import tasks
-
-    for name in tasks.TASKS:
+    for name in TASKS:
         files = sorted(p.name for p in (VIDEOS / name).glob("*.mp4"))
         assert files == [*(f"expert_{i:02d}.mp4" for i in range(1, 16)), "random.mp4"]
 
 
-@pytest.mark.parametrize("name, frames", [("reach", 1056), ("push", 398)])
+@pytest.mark.parametrize(
+    "name, frames", [("reach", 1056), ("push", 398), ("slide", 650), ("coffee", 658), ("drawer", 986)]
+)
 def test_demonstration_and_random_video_have_the_papers_frames(name, frames):
     parts = [video.read(VIDEOS / name / f"{part}.mp4")[0] for part in ("expert_01", "random")]
     assert sum(map(len, parts)) == frames  # Table I
