@@ -40,6 +40,7 @@ from tasks.world import record_expert, record_random
 
 FPS = 25
 EXPERTS = 15  # videos of the task being done; the method learns from the first alone
+TRIES = 3 * EXPERTS  # a human films again when it went wrong, but not for ever
 TEST_EPISODES = 10  # as in the paper
 JITTER = 0.005  # m, start jitter, so that ten test episodes are ten episodes
 TEST_SEED = 1_000_000  # first seed of the test episodes, far from those of training
@@ -86,9 +87,13 @@ def record(name):
     env = gym.make(tasks.id_of(name), embodiment="human").unwrapped
     seed, films = 0, []
     while len(films) < EXPERTS:
+        if seed == TRIES:
+            raise InputError(
+                f"{name}: its expert succeeds in {len(films)} of {seed} tries; mend its waypoints."
+            )
         film, _, done = record_expert(env, seed)
         seed += 1
-        if done:  # a human films again when it went wrong
+        if done:
             films.append(film)
             video.write(folder / f"expert_{len(films):02d}.mp4", film, FPS)
     random, _ = record_random(env, recipe.human_frames - len(films[0]), seed=seed, take=20)
