@@ -77,10 +77,8 @@ class Coffee(TaskEnv):
         self.world.p.changeDynamics(self.mug, -1, lateralFriction=MUG_FRICTION)
 
     def place(self, offset, scatter):
-        position = np.array([MUG_START, 0, HEIGHT / 2]) + offset
-        if scatter:
-            position[0] = self.free_x(SCATTER, RADIUS, HEIGHT)
-        self.world.p.resetBasePositionAndOrientation(self.mug, position, (0, 0, 0, 1))
+        start = np.array([MUG_START, 0, HEIGHT / 2]) + offset
+        self.put(self.mug, start, RADIUS, HEIGHT, SCATTER if scatter else None)
 
         self.time = self.np_random.uniform(0, PERIOD)
         self.swing()
@@ -97,13 +95,13 @@ class Coffee(TaskEnv):
             self.world.p.resetBasePositionAndOrientation(self.lamp, (x, WALL - 0.08, LAMP[2]), (0, 0, 0, 1))
 
     def object_position(self):
-        return np.array(self.world.p.getBasePositionAndOrientation(self.mug)[0])
+        return self.world.position(self.mug)
 
     def target_position(self):
         return np.array([OUTLET, 0, HEIGHT / 2])
 
     def is_success(self):
-        return np.linalg.norm(self.object_position() - self.target_position()) < SUCCESS
+        return self.distance() < SUCCESS
 
     def waypoints(self):
         behind = self.object_position()[0] - self.CONTACT - 0.025

@@ -33,19 +33,17 @@ class Push(TaskEnv):
         self.world.p.changeDynamics(self.cube, -1, lateralFriction=CUBE_FRICTION)
 
     def place(self, offset, scatter):
-        position = np.array([CUBE_START, 0, CUBE / 2]) + offset
-        if scatter:
-            position[0] = self.free_x(SCATTER, CUBE / 2, CUBE)
-        self.world.p.resetBasePositionAndOrientation(self.cube, position, (0, 0, 0, 1))
+        start = np.array([CUBE_START, 0, CUBE / 2]) + offset
+        self.put(self.cube, start, CUBE / 2, CUBE, SCATTER if scatter else None)
 
     def object_position(self):
-        return np.array(self.world.p.getBasePositionAndOrientation(self.cube)[0])
+        return self.world.position(self.cube)
 
     def target_position(self):
         return np.array([TARGET, 0, CUBE / 2])
 
     def is_success(self):
-        return np.linalg.norm(self.object_position() - self.target_position()) < SUCCESS
+        return self.distance() < SUCCESS
 
     def waypoints(self):
         behind = self.object_position()[0] - self.CONTACT - 0.025

@@ -33,7 +33,7 @@ class Reach(TaskEnv):
         return np.array(TARGET)
 
     def is_success(self):
-        return np.linalg.norm(self.arm.tip_pose()[0] - TARGET) < SUCCESS
+        return self.distance() < SUCCESS
 
     def waypoints(self):
         return [Leg(np.array(TARGET), 1.0), Leg(np.array(TARGET), 0.2)]  # the tip lags its goal by 2 / 20 s

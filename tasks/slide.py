@@ -40,20 +40,18 @@ class Slide(TaskEnv):
         self.world.p.changeDynamics(self.puck, -1, lateralFriction=PUCK_FRICTION)
 
     def place(self, offset, scatter):
-        position = np.array([PUCK_START, 0, HEIGHT / 2]) + offset
-        if scatter:
-            position[0] = self.free_x(SCATTER, RADIUS, HEIGHT)
-        self.world.p.resetBasePositionAndOrientation(self.puck, position, (0, 0, 0, 1))
+        start = np.array([PUCK_START, 0, HEIGHT / 2]) + offset
+        self.put(self.puck, start, RADIUS, HEIGHT, SCATTER if scatter else None)
 
     def object_position(self):
-        return np.array(self.world.p.getBasePositionAndOrientation(self.puck)[0])
+        return self.world.position(self.puck)
 
     def target_position(self):
         return np.array([TARGET, 0, HEIGHT / 2])
 
     def is_success(self):
         speed = np.linalg.norm(self.world.p.getBaseVelocity(self.puck)[0])
-        return np.linalg.norm(self.object_position() - self.target_position()) < SUCCESS and speed < AT_REST
+        return self.distance() < SUCCESS and speed < AT_REST
 
     def waypoints(self):
         behind = self.object_position() * (1, 1, 0) + (-self.CONTACT - 0.04, 0, 0.02)

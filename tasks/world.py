@@ -184,6 +184,10 @@ class World:
         picture[seen] = np.asarray(rgba, np.uint8).reshape(size, size, 4)[seen, :3]
         return picture, np.minimum(depth, self.depth)
 
+    def position(self, body: int) -> np.ndarray:
+        """Centre of a body, (3,) in m."""
+        return np.array(self.p.getBasePositionAndOrientation(body)[0])
+
     def pixel(self, point) -> np.ndarray:
         """Where a world point (m) appears in the image: (x right, y down) in pixels."""
         view = np.array(self.view).reshape(4, 4).T
@@ -279,12 +283,15 @@ class TaskEnv(gym.Env):
             self._stand_beside()
         return self._observe(), self._info()
 
-    def free_x(self, span, half, height) -> float:
-        """Anywhere in `span` (m along x) where a thing of half width and height (m) is clear of the arm."""
-        x, tip = self.np_random.uniform(*span), self.arm.goal
-        if abs(x - tip[0]) < half + 2 * FINGER and tip[2] < height + 0.02:
-            x = max(span, key=lambda end: abs(end - tip[0]))
-        return x
+    def put(self, body, position, half, height, span=None) -> None:
+        """Stand a body of that half width and height (m) at `position`; with `span`, anywhere along x in
+        it where it is clear of the arm."""
+        if span is not None:
+            x, tip = self.np_random.uniform(*span), self.arm.goal
+            if abs(x - tip[0]) < half + 2 * FINGER and tip[2] < height + 0.02:
+                x = max(span, key=lambda end: abs(end - tip[0]))
+            position[0] = x
+        self.world.p.resetBasePositionAndOrientation(body, position, (0, 0, 0, 1))
 
     def _stand_beside(self):
         """Put the tip low and next to the object, if it is in reach: a task is about contact, and chance
@@ -327,6 +334,10 @@ class TaskEnv(gym.Env):
 
     def _info(self):
         return {"is_success": bool(self.is_success())}
+
+    def distance(self) -> float:
+        """From the object to where it has to get, in m."""
+        return np.linalg.norm(self.object_position() - self.target_position())
 
     def true_pixels(self) -> np.ndarray:
         """(4,): the tip's and the object's place in the image, in pixels; for plots and tests only."""
