@@ -13,8 +13,9 @@ import numpy as np
 
 from .training import InputError
 
-LEAST_STEP = 0.1  # of the robot's step: what moves less is a pause; at 0.25 slow motion goes too, and the
-# robot, always late, hits a sliding puck 5 cm too far to catch up
+LEAST_STEP = 0.1  # of the robot's step: what moves less from frame to frame rests
+REST = 5  # frames of a rest that stay, 0.2 s: movements start and end slowly; without them the robot is
+# always late, and hits a sliding puck too hard to catch up
 MOST_OF_HORIZON = 0.7  # the demonstration's share of an episode, so that time is left to reach its goal
 MENDS = ("trim", "speed", "include_goal", "weights", "timed")  # the switches of `KeypointReward`
 STILL = 0.1  # of the widest keypoint's extent: a keypoint that moves less takes no part in the skill
@@ -42,11 +43,16 @@ def keypoint_noise(video: np.ndarray) -> np.ndarray:
     return 1.4826 * np.median(np.abs(bend), axis=(0, 2)) / np.sqrt(6)
 
 
-def trim_pauses(z: np.ndarray, least: float) -> np.ndarray:
-    """Drop frames of z (N, K, 2) nearer than `least` to the last one kept; first and last frame stay."""
-    kept = [0]
+def trim_pauses(z: np.ndarray, least: float, rest: int = 0) -> np.ndarray:
+    """Cut pauses of z (N, K, 2): frames nearer than `least` to the last one that moved, but for `rest`.
+
+    First and last frame stay.
+    """
+    kept, moved = [0], 0
     for i in range(1, len(z) - 1):
-        if np.linalg.norm(z[i] - z[kept[-1]]) >= least:
+        if np.linalg.norm(z[i] - z[moved]) >= least:
+            moved = i
+        if i - moved <= rest:
             kept.append(i)
     return z[[*kept, len(z) - 1]]
 
@@ -71,7 +77,7 @@ def prepare(z, robot, *, horizon=None, trim=True, speed=True) -> np.ndarray:
     """
     z, step = np.asarray(z, np.float64), _median_step(robot)
     z = np.concatenate([z[:1], np.median([z[:-2], z[1:-1], z[2:]], axis=0), z[-1:]])  # one lost frame
-    z = trim_pauses(z, LEAST_STEP * step) if trim else z
+    z = trim_pauses(z, LEAST_STEP * step, REST) if trim else z
     longest = int(MOST_OF_HORIZON * horizon) if horizon else 10 * len(z)
     return resample(z, _top_step(robot), longest) if speed else z
 

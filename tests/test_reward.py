@@ -175,6 +175,11 @@ def test_trimming_keeps_slow_motion_that_adds_up():
     assert trim_pauses(z, 0.25)[:, 0, 0].tolist() == [0, 0.3, 0.6, 0.7]
 
 
+def test_a_short_rest_stays_and_a_long_one_is_cut():
+    z = line(0, 1, 1, 1, 1, 1, 1, 2, 2, 3)
+    assert trim_pauses(z, 0.5, rest=2)[:, 0, 0].tolist() == [0, 1, 1, 1, 2, 2, 3]
+
+
 def test_resampling_slows_down_what_is_too_fast():
     z = resample(line(*np.linspace(0, 1, 11)), 0.05, 1000)
     assert np.diff(z[:, 0, 0]) == pytest.approx(np.full(20, 0.05))

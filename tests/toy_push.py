@@ -90,7 +90,7 @@ def demonstration(goal=GOAL):
     env = ToyPush()
     reach = HALF_PUCK + HALF_GRIPPER
     behind, end = (-0.26, 0.5, 0.35, 4), (goal - reach, 0.5, 0.5, 3)
-    return follow(env, [(*START, 1, 4), (-0.3, 0.3, 0.35, 0), behind, end])
+    return follow(env, [(*START, 1, 7), (-0.3, 0.3, 0.35, 0), behind, end])
 
 
 def random_frames(n, seed=0):
