@@ -28,7 +28,7 @@ class Slide(TaskEnv):
     CAMERA = ((0.71, 0.0, 0.20), 1.58)  # m: 70 cm fill the image
     STEP, LEASH = 0.04, 0.06  # m: 1 m/s at full action
     KP = 1600.0  # 1/s^2: at 400 the tip lags a hit by 9 cm, which hides in the goal what the puck will do
-    WORKSPACE = ((0.42, -0.002, 0.015), (0.64, 0.002, 0.22))
+    WORKSPACE = ((0.42, -0.002, 0.015), (0.64, 0.002, 0.28))
     START = (0.46, 0.0, 0.15)
     CONTACT = RADIUS + FINGER
 
