@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from lbw_minimal.imitate import Recipe
-from tasks.world import FINGER, Leg, TaskEnv
+from tasks.world import FINGER, RED, Leg, TaskEnv
 
 HORIZON = 300  # control steps: 12 s
 OPEN = 0.15  # m, the joint stands at -OPEN when open, at 0 when shut
@@ -17,12 +17,12 @@ SHUT = -0.0315  # m: success from here on, the threshold of the original
 FRONT = 0.70  # m along x, the cabinet's face
 CABINET = (0.12, 0.20, 0.14)  # m, depth, width, height
 PANEL = (0.012, 0.16, 0.08)  # m, the drawer's front: thickness, width, height
-HANDLE = (0.03, 0.09, 0.026)  # m: how far it stands out, width, height
+HANDLE = (0.045, 0.10, 0.044)  # m: how far it stands out, width, height; as large in the picture as a cube
 REACH = PANEL[0] + HANDLE[0]  # m, the grip's way from the drawer's face
 HEIGHT = 0.065  # m, the handle's centre above the table
 DRAWER_MASS = 0.8  # kg
 RAIL_FRICTION = 18.0  # N, dry: nothing slides on by itself
-WOOD, DARK, BRASS = (0.45, 0.42, 0.30, 1), (0.30, 0.27, 0.20, 1), (0.78, 0.12, 0.10, 1)
+WOOD = (0.45, 0.42, 0.30, 1)
 
 
 class Drawer(TaskEnv):
@@ -39,12 +39,12 @@ class Drawer(TaskEnv):
         self.cabinet = self.world.box(half, (FRONT + depth / 2, 0, height / 2), WOOD)
 
     def build(self):
-        half = [np.array(size) / 2 for size in (PANEL, HANDLE, (OPEN, 0.8 * PANEL[1], 0.6 * PANEL[2]))]
+        half = [np.array(size) / 2 for size in (PANEL, HANDLE, (OPEN, 0.8 * PANEL[1], 0.5 * PANEL[2]))]
         self.drawer = self.world.assembly(
             [
                 ("box", half[0], (-PANEL[0] / 2, 0, 0), WOOD, DRAWER_MASS, True),
-                ("box", half[1], (-PANEL[0] - HANDLE[0] / 2, 0, 0), BRASS, 0.05, True),
-                ("box", half[2], (OPEN / 2, 0, 0), DARK, 0.05, True),
+                ("box", half[1], (-PANEL[0] - HANDLE[0] / 2, 0, 0), RED, 0.05, True),
+                ("box", half[2], (OPEN / 2, 0, 0), WOOD, 0.05, True),
             ],
             (FRONT, 0, HEIGHT),
             slides=(1, 0, 0),
