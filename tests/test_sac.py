@@ -247,6 +247,7 @@ def test_the_best_actor_of_a_training_stays(monkeypatch):
             return super().reset(seed=seed)
 
     monkeypatch.setattr(module, "WINDOW", 1)
+    monkeypatch.setattr(SAC, "slow_down", lambda self, passed: None)  # both trainings at the same pace
     recipe = dict(seed=0, random_steps=20, width=8, batch=8)
     kept, log = train(Tide(), steps=400, **recipe)
     assert len(log) == 20 and max(log, key=lambda row: row["return"])["episode"] == 11
@@ -254,6 +255,18 @@ def test_the_best_actor_of_a_training_stays(monkeypatch):
     for p, q in zip(kept.test_actor.parameters(), stopped.test_actor.parameters(), strict=True):
         assert torch.equal(p, q)
     assert not torch.equal(kept.actor.net[0].weight, stopped.actor.net[0].weight)
+
+
+def test_the_learning_rates_stay_then_fall_to_zero():
+    sac = SAC(1, 1, width=8, critic_lr=1e-3, actor_lr=5e-4)
+
+    def rates(passed):
+        sac.slow_down(passed)
+        return [group["lr"] for group in sac.optimizer.param_groups]
+
+    assert rates(0.1) == rates(0.3) == [1e-3, 5e-4]
+    assert rates(0.65) == pytest.approx([5e-4, 2.5e-4])
+    assert rates(1.0) == rates(1.1) == [0, 0]
 
 
 def test_it_learns_to_stand_at_the_right_place():
