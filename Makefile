@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN = $(VENV)/bin
 
-.PHONY: push reach test slow bench clean
+.PHONY: push reach test slow bench lab notebooks book clean
 
 push reach: $(VENV)/ready
 	$(BIN)/python -m tasks $@
@@ -18,6 +18,15 @@ slow: $(VENV)/ready
 
 bench: $(VENV)/ready
 	$(BIN)/python -m tasks bench
+
+lab: $(VENV)/ready
+	$(BIN)/jupyter lab --notebook-dir=.
+
+notebooks: $(VENV)/ready
+	$(BIN)/python -m solutions release
+
+book: $(VENV)/ready
+	$(BIN)/python -m solutions book
 
 $(VENV)/ready: requirements.txt
 	@$(PYTHON) -c 'import sys; v = sys.version_info[:2]; sys.exit(0 if (3, 10) <= v <= (3, 11) else \

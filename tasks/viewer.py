@@ -231,6 +231,11 @@ class Recorder:
             target=y_up(self.target),
         )
 
+    def _repr_html_(self) -> str:
+        """In a notebook a recorder as a cell's value shows itself, in a frame of its own."""
+        page = html.escape(self.html("scene"))
+        return f'<iframe srcdoc="{page}" style="width: 100%; height: 420px; border: 0"></iframe>'
+
     def save(self, path: Path | str, title: str = "PyBullet scene", **options) -> None:
         """Write `html(title, **options)` to a file, whole or not at all."""
         write_atomic(path, self.html(title, **options))

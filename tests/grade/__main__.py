@@ -1,0 +1,195 @@
+"""Grade a folder of submissions: `python -m tests.grade FOLDER`.
+
+One folder or one notebook each. A submission is a job of its own: FOLDER may be a single one, too. Out, in
+`--out`: class.csv, junit.xml, and for each submission a folder with result.json, feedback.html and, on
+request, Gradescope's results.json. What is finished is not graded again unless it or the checks changed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import hashlib
+import io
+import json
+import re
+import shutil
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict
+from pathlib import Path
+
+import torch
+
+from lbw_minimal.training import write_atomic
+from tests.grade import feedback, sandbox
+from tests.grade.exercise import everything
+from tests.grade.judge import Result, judge, nothing
+from tests.grade.sandbox import Lost, Sandbox
+from tests.grade.submission import MOST, STUB, Unreadable, answer, cells
+
+MANY = 50  # notebooks of one submission that are read
+
+
+def main(argv=None) -> int:
+    """Returns the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m tests.grade", description=__doc__.split("\n")[0])
+    parser.add_argument("folder", type=Path, help="submissions: one folder or one notebook each")
+    parser.add_argument("--out", type=Path, default=Path("grades"))
+    parser.add_argument("--notebooks", help="numbers, such as 5 or 5,6; default: all that anyone handed in")
+    parser.add_argument("-j", "--jobs", type=int, default=2, help="submissions at a time")
+    parser.add_argument("--gradescope", action="store_true", help="write results.json for Gradescope, too")
+    args = parser.parse_args(argv)
+    if not args.folder.exists():
+        print(f"{args.folder}: no such folder", file=sys.stderr)
+        return 2
+    if not shutil.which("bwrap"):
+        print(f"warning: {sandbox.WARNING}", file=sys.stderr)
+    torch.set_num_threads(1)
+    single = args.folder.suffix == ".ipynb" or (any(args.folder.glob("*.ipynb")) and _is_one(args.folder))
+    entries = [args.folder] if single else sorted(p for p in args.folder.iterdir() if not hidden(p))
+    try:
+        numbers = args.notebooks.split(",") if args.notebooks else handed_in(entries)
+        ids = [id for id in everything() if id.split(".")[0] in numbers]
+    except ValueError:
+        ids = []
+    if not ids:
+        print("no exercises to grade: give --notebooks with their numbers", file=sys.stderr)
+        return 2
+    args.out.mkdir(parents=True, exist_ok=True)
+
+    def job(entry):
+        done = grade_once(entry, ids, args.out, args.gradescope)
+        print(f"{entry.name}: {done['points']:g} of {done['most']:g}", flush=True)
+        return done
+
+    with ThreadPoolExecutor(args.jobs) as pool:
+        grades = list(pool.map(job, entries))
+    write_atomic(args.out / "class.csv", table(grades, ids))
+    write_atomic(args.out / "junit.xml", feedback.junit(grades))
+    return 0
+
+
+def _is_one(folder: Path) -> bool:
+    """Whether a folder with notebooks in it is one submission, not a class: no exercise stands in two."""
+    ids = [i for path in notebooks(folder) for i in _ids(path)]
+    return len(ids) == len(set(ids))
+
+
+def hidden(entry: Path) -> bool:
+    """Whether an entry of the class folder is the system's, such as .DS_Store, and nobody's work."""
+    return entry.name[0] == "." and not notebooks(entry)
+
+
+def notebooks(entry: Path) -> list[Path]:
+    """The notebooks of a submission, whatever they are called."""
+    if entry.is_symlink():
+        return []
+    if entry.is_file():
+        return [entry] if entry.suffix == ".ipynb" else []
+    found = (p for p in sorted(entry.rglob("*.ipynb")) if ".ipynb_checkpoints" not in p.parts)
+    return [p for p in found if not p.is_symlink()][:MANY]
+
+
+def _ids(path: Path) -> set[str]:
+    try:
+        found = {c["id"] for c in cells(path)}
+    except Unreadable:
+        return set()
+    return {id for id, e in everything().items() if e.grade_id in found}
+
+
+def handed_in(entries: list[Path]) -> list[str]:
+    """Numbers of the notebooks that the class handed in."""
+    return sorted({id.split(".")[0] for entry in entries for path in notebooks(entry) for id in _ids(path)})
+
+
+def grade(entry: Path, ids: list[str]) -> tuple[list[Result], list[str]]:
+    """Results of the exercises `ids` in one submission, and what went wrong with its files."""
+    code, notes = [], []
+    for path in notebooks(entry):
+        try:
+            code += cells(path)
+        except Unreadable as e:
+            notes.append(f"{path.name}: {e}")
+    if not code and not notes:
+        notes.append("no notebook found")
+    known, results = everything(), []
+    with Sandbox() as box:
+        for id in ids:
+            exercise, source = known[id], answer(known[id], code)
+            if source is None:
+                results.append(nothing(exercise, "no cell with this exercise", open=True))
+            elif STUB in source:
+                results.append(nothing(exercise, "not done yet", open=True))
+            else:
+                results.append(grade_one(exercise, source, box))
+    return results, notes
+
+
+def grade_one(exercise, source: str, box: Sandbox) -> Result:
+    """The result of one answer, run in the sandbox."""
+    try:
+        failed = box.open(source, exercise.given, exercise.probe)
+        if failed is not None:
+            text = getattr(failed, "text", "")
+            return nothing(exercise, f"the cell does not run: {failed}: {text}" if text else f"{failed}")
+        return judge(exercise, box.call)
+    except Lost as e:
+        return nothing(exercise, str(e))
+    finally:
+        box.close()
+
+
+def grade_once(entry: Path, ids: list[str], out: Path, gradescope: bool) -> dict:
+    """Grade a submission and write its pages, unless that has been done for the same files and checks."""
+    digest = fingerprint(entry, ids)
+    folder = out / safe(entry.name)
+    path = folder / "result.json"
+    done = json.loads(path.read_text()) if path.exists() else {}
+    if done.get("digest") != digest:
+        results, notes = grade(entry, ids)
+        done = {"submission": entry.name, "digest": digest, "notes": notes}
+        done |= {"points": sum(r.points for r in results), "most": sum(r.most for r in results)}
+        done["exercises"] = [asdict(r) | {"points": r.points, "most": r.most} for r in results]
+        folder.mkdir(parents=True, exist_ok=True)
+        write_atomic(folder / "feedback.html", feedback.page(done))
+        write_atomic(path, json.dumps(done, indent=1) + "\n")  # last: it says that all the rest is there
+    if gradescope:
+        write_atomic(folder / "results.json", json.dumps(feedback.gradescope(done), indent=1) + "\n")
+    return done
+
+
+def safe(name: str) -> str:
+    """A file name for a submission's results, unique and harmless whatever the submission is called."""
+    plain = re.sub(r"[^A-Za-z0-9_-]+", "_", name.removesuffix(".ipynb"))[:60].strip("_")
+    return f"{plain}-{hashlib.sha256(name.encode(errors='surrogateescape')).hexdigest()[:8]}"
+
+
+def fingerprint(entry: Path, ids: list[str]) -> str:
+    """Of the submission's notebooks and of the checks."""
+    sha = hashlib.sha256(",".join(ids).encode())
+    for path in notebooks(entry):
+        size = path.stat().st_size
+        sha.update(f"{path.name} {size}".encode(errors="surrogateescape"))
+        sha.update(path.read_bytes() if size <= MOST else b"")
+    for path in sorted(Path(__file__).parent.rglob("*.py")):
+        sha.update(path.read_bytes())
+    return sha.hexdigest()
+
+
+def table(grades: list[dict], ids: list[str]) -> str:
+    """The class as CSV, a row a submission."""
+    text = io.StringIO()
+    rows = csv.writer(text, lineterminator="\n")
+    rows.writerow(["submission", "points", "of", *ids, "notes"])
+    for g in grades:
+        points = {e["id"]: f"{e['points']:g}" for e in g["exercises"]}
+        name = g["submission"] if g["submission"][0] not in "=+-@" else "'" + g["submission"]  # no formula
+        notes = "; ".join(g["notes"])
+        rows.writerow([name, f"{g['points']:g}", f"{g['most']:g}", *(points[id] for id in ids), notes])
+    return text.getvalue()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

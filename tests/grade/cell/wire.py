@@ -1,0 +1,158 @@
+"""Values as bytes, between the judge and the process where a student's code runs.
+
+Numbers, strings, None, lists, tuples, dicts, numpy arrays and torch tensors pass; anything else arrives as
+`Other`, its type's name. Nothing is unpickled: bytes from a hostile process become plain values or `Garbage`.
+"""
+
+import json
+import math
+import struct
+
+import numpy as np
+
+MOST = 64 << 20  # bytes of one message
+DEEPEST = 20  # levels of lists in lists
+DTYPES = {
+    f"{kind}{size}"
+    for kind, sizes in {"f": (2, 4, 8), "i": (1, 2, 4, 8), "u": (1, 2, 4, 8)}.items()
+    for size in sizes
+} | {"b1", "c8", "c16"}
+
+
+class Garbage(ValueError):
+    """Bytes that no `encode` wrote."""
+
+
+class Other(str):
+    """A value that cannot pass, by the name of its type."""
+
+
+class Raised(str):
+    """What the student's code raised, by the name of its type; `.text` is its message."""
+
+    def __new__(cls, name, text=""):
+        self = super().__new__(cls, name)
+        self.text = text
+        return self
+
+
+def encode(value) -> bytes:
+    """Header (JSON) and buffers (raw) of a value."""
+    buffers = []
+
+    def pack(x, deep):
+        if deep > DEEPEST:
+            return {"other": "a list of lists without end"}
+        kind = type(x)
+        if x is None or kind in (bool, str):
+            return {"v": x}
+        if kind is int:
+            return {"int": str(x)} if abs(x) < 1 << 200 else {"other": "a huge int"}
+        if kind is float:
+            return {"float": x.hex() if math.isfinite(x) else repr(x)}
+        if kind in (list, tuple):
+            return {kind.__name__: [pack(item, deep + 1) for item in x]}
+        if kind is dict:
+            return {"dict": [[pack(k, deep + 1), pack(v, deep + 1)] for k, v in x.items()]}
+        if kind is Raised:
+            return {"raised": str(x), "text": x.text}
+        tensor = kind.__module__.split(".")[0] == "torch" and hasattr(x, "detach")
+        if tensor:
+            if x.device.type != "cpu":
+                return {"other": f"a tensor on {x.device}"}
+            x = x.detach().numpy()
+        if isinstance(x, np.generic):
+            x, tensor = np.asarray(x), "scalar"
+        if type(x) is np.ndarray and x.dtype.str[1:] in DTYPES:
+            # A fresh contiguous copy, so that views and odd strides pass.
+            x = np.array(x, order="C", dtype=x.dtype.newbyteorder("="))
+            buffers.append(x.tobytes())
+            return {"array": x.dtype.str[1:], "shape": list(x.shape), "kind": tensor}
+        return {"other": kind.__name__}
+
+    header = json.dumps(pack(value, 0)).encode()
+    return b"".join([struct.pack("<Q", len(header)), header, *buffers])
+
+
+def decode(data: bytes, tensor=None):
+    """The value of `encode`'s bytes. tensor: makes a tensor of an array; without it tensors stay arrays.
+
+    Raises Garbage.
+    """
+    try:
+        (n,) = struct.unpack_from("<Q", data)
+        header = json.loads(data[8 : 8 + n])
+        place = 8 + n
+
+        def unpack(x, deep):
+            nonlocal place
+            if deep > DEEPEST + 1:
+                raise Garbage("too deep")
+            if "v" in x:
+                if not (x["v"] is None or isinstance(x["v"], bool | str)):
+                    raise Garbage("not a plain value")
+                return x["v"]
+            if "int" in x:
+                if len(x["int"]) > 70:
+                    raise Garbage("a huge int")
+                return int(x["int"])
+            if "float" in x:
+                return float.fromhex(x["float"])
+            if "list" in x:
+                return [unpack(item, deep + 1) for item in x["list"]]
+            if "tuple" in x:
+                return tuple(unpack(item, deep + 1) for item in x["tuple"])
+            if "dict" in x:
+                return {unpack(k, deep + 1): unpack(v, deep + 1) for k, v in x["dict"]}
+            if "raised" in x:
+                return Raised(str(x["raised"])[:100], str(x["text"])[:1000])
+            if "array" in x:
+                if x["array"] not in DTYPES or not all(type(k) is int and k >= 0 for k in x["shape"]):
+                    raise Garbage("no such array")
+                dtype = np.dtype(x["array"])
+                size = math.prod(x["shape"]) * dtype.itemsize
+                if len(x["shape"]) > 8 or place + size > len(data):
+                    raise Garbage("an array longer than its bytes")
+                array = np.frombuffer(data, dtype, math.prod(x["shape"]), place).reshape(x["shape"]).copy()
+                place += size
+                if x["kind"] == "scalar" and array.ndim == 0:
+                    return array[()]
+                return tensor(array) if x["kind"] is True and tensor else array
+            return Other(str(x["other"])[:100])
+
+        return unpack(header, 0)
+    except Garbage:
+        raise
+    except (
+        struct.error,
+        ValueError,
+        KeyError,
+        TypeError,
+        AttributeError,
+        RecursionError,
+        OverflowError,
+    ) as e:
+        raise Garbage(str(e)) from None
+
+
+def send(channel, data: bytes) -> None:
+    channel.sendall(struct.pack("<Q", len(data)) + data)
+
+
+def receive(channel) -> bytes:
+    """One message. Raises EOFError where the other side is gone, Garbage where it is too long."""
+
+    def exactly(n):
+        parts = []
+        while n:
+            part = channel.recv(min(n, 1 << 20))
+            if not part:
+                raise EOFError
+            parts.append(part)
+            n -= len(part)
+        return b"".join(parts)
+
+    (n,) = struct.unpack("<Q", exactly(8))
+    if n > MOST:
+        raise Garbage("a message too long")
+    return exactly(n)

@@ -1,0 +1,217 @@
+"""What an exercise is: a reference, checks on random inputs, and the mistakes people make.
+
+A file in `tests/grade/exercises/` holds the exercises of one notebook:
+
+    @exercise("6.1", "Distance to the nearest frame (Eq. 9)")
+    def r1(z, z_E):
+        return -np.linalg.norm((z_E[:-1] - z).reshape(len(z_E) - 1, -1), axis=1).min()
+
+    r1.check("random keypoints", lambda rng: (rng.normal(size=(5, 2)), rng.normal(size=(9, 5, 2))), points=2)
+    r1.mistake("In Eq. 9 p ends at N - 1: your minimum includes the last frame.", "z_E[:-1]", "z_E")
+
+The decorated code is the reference; a mistake is the reference with a piece of its text replaced. A wrong
+answer that equals a mistake's gets the mistake's hint. numpy as np, torch, F, nn and math are there.
+"""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import pkgutil
+import textwrap
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+import torch
+
+from tests.grade import exercises
+from tests.grade.cell.wire import Other, Raised, decode, encode
+from tests.grade.cell.worker import PREAMBLE
+
+TRIALS = 3  # random inputs a check
+
+
+@dataclass
+class Check:
+    """`inputs(rng)` makes the arguments; the answer has to equal the reference's within the tolerances.
+
+    verify(got, args) judges instead, where many answers are right: it returns a sentence, or None if all is
+    well.
+    """
+
+    label: str
+    inputs: Callable
+    points: float
+    atol: float
+    rtol: float
+    trials: int
+    verify: Callable | None
+
+
+@dataclass
+class Mistake:
+    """A wrong answer people give, and what to tell them."""
+
+    hint: str
+    edits: list[tuple[str, str]]
+
+
+@dataclass
+class Exercise:
+    """See the module's text. probe: code that defines `probe(*args)`, how the answer is called."""
+
+    id: str
+    title: str
+    name: str  # what the cell has to define
+    source: str  # of the reference
+    given: str  # code that the cell may rely on
+    probe: str
+    checks: list[Check] = field(default_factory=list)
+    mistakes: list[Mistake] = field(default_factory=list)
+
+    @property
+    def points(self) -> float:
+        return sum(check.points for check in self.checks)
+
+    @property
+    def grade_id(self) -> str:
+        """The id of its cell; nbgrader allows no dot."""
+        return "ex-" + self.id.replace(".", "-")
+
+    def check(self, label, inputs, *, points=1, atol=1e-5, rtol=1e-4, trials=TRIALS, verify=None) -> None:
+        """Add a check."""
+        self.checks.append(Check(label, inputs, points, atol, rtol, trials, verify))
+
+    def mistake(self, hint: str, *edits: str) -> None:
+        """Add a mistake: the reference with `edits` old, new, old, new ... replaced. Raises ValueError."""
+        pairs = list(zip(edits[::2], edits[1::2], strict=True))
+        missing = [old for old, _ in pairs if old not in self.source]
+        if missing:
+            raise ValueError(f"exercise {self.id} has no {missing[0]!r} in its reference")
+        self.mistakes.append(Mistake(hint, pairs))
+
+    def wrong(self, mistake: Mistake) -> str:
+        """The source of an answer with this mistake."""
+        source = self.source
+        for old, new in mistake.edits:
+            source = source.replace(old, new)
+        return source
+
+    def run(self, source: str) -> Callable:
+        """The probe over a source we trust, as the student's process would answer."""
+        space = {"__name__": "__main__"}
+        for part in (PREAMBLE, self.given, source, self.probe):
+            exec(part, space)
+
+        def call(args):
+            torch.manual_seed(0)
+            try:
+                value = space["probe"](*decode(encode(args), torch.from_numpy))
+            except Exception as e:
+                value = Raised(type(e).__name__, str(e))
+            return decode(encode(value))
+
+        return call
+
+
+def exercise(id: str, title: str, *, given: tuple = (), probe: str = ""):
+    """Make an exercise of the function or class below.
+
+    given: functions, classes or other exercises that the answer may use. probe: see Exercise.
+    """
+
+    def wrap(thing) -> Exercise:
+        source = textwrap.dedent(inspect.getsource(thing))
+        source = source[min(source.find(word) for word in ("\ndef ", "\nclass ") if word in source) + 1 :]
+        texts = (
+            g.source if isinstance(g, Exercise) else textwrap.dedent(inspect.getsource(g)) for g in given
+        )
+        before = "\n\n".join(texts)
+        name = thing.__name__
+        call = textwrap.dedent(probe) or f"probe = {name}\n"
+        return Exercise(id, title, name, source, before, call)
+
+    return wrap
+
+
+def everything() -> dict[str, Exercise]:
+    """All exercises by id, in order."""
+    found = {}
+    for info in sorted(pkgutil.iter_modules(exercises.__path__), key=lambda m: m.name):
+        module = importlib.import_module(f"{exercises.__name__}.{info.name}")
+        found |= {e.id: e for e in vars(module).values() if isinstance(e, Exercise)}
+    return dict(sorted(found.items(), key=lambda pair: [int(n) for n in pair[0].split(".")]))
+
+
+def find(id: str) -> Exercise:
+    """Raises KeyError, with the ids there are."""
+    known = everything()
+    if id not in known:
+        raise KeyError(f"no exercise {id!r}; there are {', '.join(known)}")
+    return known[id]
+
+
+def different(got, want, check: Check) -> str | None:
+    """In what `got` differs from `want`, as a sentence to the student; None if it does not."""
+    if type(got) is Raised:
+        if type(want) is Raised and got == want:
+            return None
+        return f"it raises {got}: {got.text}" if got.text else f"it raises {got}"
+    if type(want) is Raised:
+        return f"it should raise {want} here"
+    if type(got) is Other:
+        return f"it returns {got}; expected {_kind(want)}"
+    if isinstance(want, np.ndarray) or _is_number(want):
+        return _different_numbers(got, want, check)
+    if isinstance(want, list | tuple):
+        if not isinstance(got, list | tuple) or len(got) != len(want):
+            return f"it returns {_kind(got)}; expected {_kind(want)}"
+        for i, pair in enumerate(zip(got, want, strict=True)):
+            if message := different(*pair, check):
+                return f"item {i}: {message}"
+        return None
+    if isinstance(want, dict):
+        if not isinstance(got, dict) or set(got) != set(want):
+            return f"it returns {_kind(got)}; expected a dict with {sorted(want)}"
+        for key in want:
+            if message := different(got[key], want[key], check):
+                return f"{key}: {message}"
+        return None
+    return (
+        None if type(got) is type(want) and got == want else f"it returns {got!r:.60}; expected {want!r:.60}"
+    )
+
+
+def _is_number(x) -> bool:
+    return isinstance(x, int | float | np.generic) and not isinstance(x, bool)
+
+
+def _kind(x) -> str:
+    if isinstance(x, np.ndarray):
+        return f"an array {x.shape} of {x.dtype}"
+    if isinstance(x, list | tuple):
+        return f"a {type(x).__name__} of {len(x)}"
+    return "nothing (None)" if x is None else f"a {type(x).__name__}"
+
+
+def _different_numbers(got, want, check):
+    if not (isinstance(got, np.ndarray) or _is_number(got) or isinstance(got, bool)):
+        return f"it returns {_kind(got)}; expected {_kind(want)}"
+    got, want = np.asarray(got), np.asarray(want)
+    if got.shape != want.shape:
+        return f"it has shape {got.shape}; expected {want.shape}"
+    if (got.dtype.kind == "b") != (want.dtype.kind == "b") or (want.dtype.kind in "iu") > (
+        got.dtype.kind in "iu"
+    ):
+        return f"its values are {got.dtype}; expected {want.dtype}"
+    if not np.isfinite(got).all() and np.isfinite(want).all():
+        return "it contains NaN or infinity"
+    if got.dtype.kind == "b":
+        return None if (got == want).all() else "some of its truth values are wrong"
+    close = np.isclose(got, want, atol=check.atol, rtol=check.rtol, equal_nan=True)
+    if close.all():
+        return None
+    at = np.unravel_index(np.argmin(close), close.shape) if close.ndim else ()
+    where = f" at {tuple(int(i) for i in at)}" if at else ""
+    return f"it gives {got[at]:.5g}{where}; expected {want[at]:.5g}"

@@ -1,0 +1,83 @@
+"""What comes out of grading: the student's page, JUnit XML, and Gradescope's results.json."""
+
+from __future__ import annotations
+
+from html import escape
+from xml.etree import ElementTree
+
+from tests.grade.judge import Outcome, Result
+
+CSS = """
+body { font: 16px/1.5 system-ui, sans-serif; max-width: 46em; margin: 2em auto; padding: 0 1em; color: #222 }
+h2 { font-size: 1.1em; margin: 1.6em 0 .2em } .points { float: right } ul { list-style: none; padding: 0 }
+li { padding: .3em .6em; border-left: 4px solid; margin: .3em 0; background: #f6f6f6 }
+.ok { border-color: #0072b2 } .wrong { border-color: #d55e00 } .hint { display: block; color: #444 }
+"""
+
+
+def _result(e: dict) -> Result:
+    return Result(e["id"], e["title"], [Outcome(**o) for o in e["outcomes"]], e["open"])
+
+
+def page(done: dict) -> str:
+    """The feedback page of one submission, HTML that loads nothing."""
+    parts = []
+    for e in done["exercises"]:
+        items, said = [], set()
+        for o in e["outcomes"]:
+            new = o["message"] and o["message"] not in said
+            said.add(o["message"])
+            hint = f'<span class="hint">{escape(o["message"])}</span>' if new else ""
+            state = "wrong" if o["message"] else "ok"
+            mark = f"{o['points']:g}/{o['most']:g}"
+            items.append(f'<li class="{state}">{mark} {escape(o["label"])}{hint}</li>')
+        head = f'<span class="points">{e["points"]:g} / {e["most"]:g}</span>{e["id"]} {escape(e["title"])}'
+        parts.append(f"<h2>{head}</h2><ul>{''.join(items)}</ul>")
+    notes = "".join(f"<p>{escape(note)}</p>" for note in done["notes"])
+    name = escape(done["submission"].encode(errors="replace").decode())
+    return (
+        f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{name}</title><style>{CSS}</style>'
+        f"<h1>{name}: {done['points']:g} of {done['most']:g} points</h1>{notes}{''.join(parts)}</html>\n"
+    )
+
+
+def _clean(text: str) -> str:
+    """Without the control characters that XML forbids."""
+    return "".join(
+        c if c in "\t\n" or " " <= c < "\ud800" or "\ue000" <= c <= "\ufffd" else "?" for c in text
+    )
+
+
+def junit(grades: list[dict]) -> str:
+    """The class as JUnit XML: a suite a submission, a case an exercise."""
+    root = ElementTree.Element("testsuites")
+    for g in grades:
+        cases, name = g["exercises"], _clean(g["submission"])
+        failed = [e for e in cases if e["points"] < e["most"]]
+        counts = {"tests": str(len(cases)), "failures": str(len(failed))}
+        suite = ElementTree.SubElement(root, "testsuite", {"name": name} | counts)
+        for e in cases:
+            case = ElementTree.SubElement(
+                suite, "testcase", {"classname": name, "name": f"{e['id']} {e['title']}"}
+            )
+            if e in failed:
+                mark = f"{e['points']:g} of {e['most']:g}"
+                failure = ElementTree.SubElement(case, "failure", {"message": mark})
+                failure.text = _clean("\n".join(_result(e).lines()))
+    return ElementTree.tostring(root, encoding="unicode") + "\n"
+
+
+def gradescope(done: dict) -> dict:
+    """Gradescope's results.json."""
+    return {
+        "output": "\n".join(done["notes"]),
+        "tests": [
+            {
+                "name": f"{e['id']} {e['title']}",
+                "score": e["points"],
+                "max_score": e["most"],
+                "output": "\n".join(_result(e).lines()),
+            }
+            for e in done["exercises"]
+        ],
+    }

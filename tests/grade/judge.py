@@ -1,0 +1,122 @@
+"""Judging an answer: the same checks in the notebook, under pytest, and in the grader.
+
+The judge makes the inputs, keeps the references and compares; how an answer is called is somebody else's
+(`call`): the notebook calls its own function, the grader a process it does not trust.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from tests.grade.cell.wire import Other, Raised
+from tests.grade.exercise import Check, Exercise, different
+from tests.grade.sandbox import Lost
+
+OPEN = ("NotImplementedError", "StillOpen")  # what an untouched exercise raises
+
+
+@dataclass
+class Outcome:
+    """What became of one check. message: empty if it passed."""
+
+    label: str
+    points: float
+    most: float
+    message: str = ""
+
+
+@dataclass
+class Result:
+    """What became of an exercise. open: nobody has worked on it yet."""
+
+    id: str
+    title: str
+    outcomes: list[Outcome] = field(default_factory=list)
+    open: bool = False
+
+    @property
+    def points(self) -> float:
+        return sum(o.points for o in self.outcomes)
+
+    @property
+    def most(self) -> float:
+        return sum(o.most for o in self.outcomes)
+
+    def lines(self) -> list[str]:
+        """The feedback, a line a check; a message stands once."""
+        said, lines = set(), []
+        for o in self.outcomes:
+            note = f": {o.message}" if o.message and o.message not in said else ""
+            said.add(o.message)
+            lines.append(f"{'ok   ' if not o.message else 'wrong'} {o.points:g}/{o.most:g}  {o.label}{note}")
+        return lines
+
+
+def nothing(exercise: Exercise, message: str, open: bool = False) -> Result:
+    """No points, one reason."""
+    outcomes = [Outcome(c.label, 0, c.points, message) for c in exercise.checks]
+    return Result(exercise.id, exercise.title, outcomes, open)
+
+
+def judge(exercise: Exercise, call, seed: int = 0) -> Result:
+    """Run all checks of an exercise on the answer behind call(args) -> (value, changed its inputs).
+
+    A call that raises Lost ends the exercise: what was earned before stays.
+    """
+    reference = exercise.run(exercise.source)
+    mistakes = [(m.hint, exercise.run(exercise.wrong(m))) for m in exercise.mistakes]
+    result, lost, first = Result(exercise.id, exercise.title), "", None
+    for i, check in enumerate(exercise.checks):
+        rng = np.random.default_rng([seed, i])
+        message = lost
+        for _ in range(check.trials):
+            if message:
+                break
+            args = check.inputs(rng)
+            try:
+                got, changed = call(args)
+            except Lost as e:
+                message = lost = str(e)
+                break
+            if type(got) is Raised and got in OPEN:
+                return nothing(exercise, "not done yet", open=True)
+            message = _message(check, got, args, reference, mistakes)
+            if not message and changed:
+                message = "it changes its inputs: work on a copy"
+            if not message and first is None:
+                first = args, got
+        result.outcomes.append(Outcome(check.label, 0 if message else check.points, check.points, message))
+    if first and not lost:
+        message = _repeat(first, call)
+        if message:
+            return nothing(exercise, message)
+    return result
+
+
+def _message(check: Check, got, args, reference, mistakes) -> str:
+    want = reference(args)
+    wrong = check.verify(got, args) if check.verify else different(got, want, check)
+    if not wrong:
+        return ""
+    if type(got) is Raised and got == "ImportError" and "your own lines" in got.text:
+        return got.text
+    if type(got) is Raised and got == "MemoryError":
+        return "it needs more memory than an exercise may take (2 GB)"
+    for hint, answer in mistakes:
+        theirs = answer(args)
+        if type(theirs) is not Other and not different(got, theirs, check) and different(want, theirs, check):
+            return hint
+    return wrong
+
+
+def _repeat(first, call) -> str:
+    """The first input once more: a function's answer hangs on its inputs alone."""
+    args, before = first
+    try:
+        again, _ = call(args)
+    except Lost as e:
+        return str(e)
+    exact = Check("", lambda rng: (), 0, 1e-6, 1e-6, 1, None)
+    return "the same input gives another answer the second time" if different(again, before, exact) else ""

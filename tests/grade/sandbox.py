@@ -1,0 +1,185 @@
+"""A place for a student's code: a process that cannot read, write, send or stay.
+
+With bubblewrap (`bwrap`) it sees the Python installation and nothing else of the disk, and no network.
+Without it, limits and a system-call filter remain (see `cell/worker.py`), but files can be read: `WARNING`
+says so.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import shutil
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from tests.grade.cell import wire
+
+CELL = Path(__file__).resolve().parent / "cell"
+WARNING = (
+    "bubblewrap is not installed: the code of submissions cannot write, fork or reach the network, but it "
+    "can read the files of this machine. Install it (Debian: apt install bubblewrap) before you grade."
+)
+MEMORY = 2 << 30  # bytes a student's code may take
+CPU = 10  # s of processor time for one exercise
+WALL = 15  # s for one call, asleep or not
+ENDED = f"the process ended: an exit, a crash, or more than {CPU} s of processor time"
+START = 120  # s for the libraries to load on a busy machine
+
+
+class Lost(Exception):
+    """The student's process is gone, or had to go; the message says why, to the student."""
+
+
+def command(fd: int) -> list[str]:
+    """How to start the worker: inside bubblewrap where there is one."""
+    python = [sys.executable, "-I", "-B", str(CELL / "worker.py"), str(fd)]
+    bwrap = shutil.which("bwrap")
+    if not bwrap:
+        return python
+    seen = ("/usr", "/lib", "/lib64", "/bin", "/etc/ld.so.cache", "/etc/alternatives")
+    homes = {Path(p).resolve() for p in (sys.prefix, sys.base_prefix)} | {Path(sys.prefix), CELL}
+    binds = [x for path in seen for x in ("--ro-bind-try", path, path)]
+    binds += [x for path in sorted(map(str, homes)) for x in ("--ro-bind", path, path)]
+    return [
+        bwrap, "--unshare-all", "--die-with-parent", "--new-session", "--clearenv", "--cap-drop", "ALL",
+        "--size", str(8 << 20), "--tmpfs", "/tmp", *binds, "--proc", "/proc", "--dev", "/dev", "--setenv",
+        "OMP_NUM_THREADS", "1", "--chdir", "/tmp", *python,
+    ]  # fmt: skip
+
+
+class Sandbox:
+    """One worker process; `open` an exercise, `call` it, `close` it. It is started again when lost."""
+
+    def __init__(self):
+        self.process = self.channel = None
+        self.number = 0
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.kill()
+
+    def start(self) -> None:
+        ours, theirs = socket.socketpair()
+        env = {"OMP_NUM_THREADS": "1", "PATH": os.environ.get("PATH", "")}
+        self.process = subprocess.Popen(
+            command(theirs.fileno()), pass_fds=[theirs.fileno()], stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True, env=env,
+        )  # fmt: skip
+        theirs.close()
+        self.channel = ours
+        try:
+            if self._receive(START) != b"ready":
+                raise Lost("the grading process spoke before its turn")
+        except Lost as e:
+            raise RuntimeError("the grading process does not start") from e
+
+    def kill(self) -> None:
+        """End the worker and all it has started."""
+        if self.process:
+            for pid in _descendants(self.process.pid):
+                _kill(pid)
+            self.process.kill()
+            self.process.wait()
+            self.channel.close()
+            self.process = self.channel = None
+
+    def open(self, source: str, given: str, probe: str) -> wire.Raised | None:
+        """Define `source` after `given`; what it raised, or None. Raises Lost."""
+        if not self.process:
+            self.start()
+        self.number += 1
+        job = {"source": source, "given": given, "probe": probe, "number": self.number}
+        self._send(wire.encode(job | {"memory": MEMORY, "cpu": CPU}))
+        failed = self._answer()
+        if type(failed) is str:  # before the student's first line
+            raise RuntimeError(failed)
+        return failed
+
+    def call(self, args: tuple):
+        """(what the probe returned or raised, whether it changed its arguments). Raises Lost."""
+        self._send(wire.encode(args))
+        answer = self._answer()
+        if type(answer) is not list or len(answer) != 2:
+            raise self._lost("it sent something else than an answer")
+        return answer[0], answer[1] is True
+
+    def close(self) -> None:
+        """Leave the exercise; its process ends."""
+        if self.process:
+            try:
+                self._send(b"")
+                if self._answer(leaving=True) != "left":
+                    self.kill()
+            except Lost:
+                self.kill()
+
+    def _lost(self, why: str) -> Lost:
+        self.kill()
+        return Lost(why)
+
+    def _send(self, data: bytes) -> None:
+        try:
+            self.channel.settimeout(WALL)
+            wire.send(self.channel, data)
+        except OSError:
+            raise self._lost(ENDED) from None
+
+    def _answer(self, leaving: bool = False):
+        data = self._receive(WALL)
+        if data[8:] == wire.encode("left") and not leaving:
+            raise self._lost(ENDED)
+        if len(data) < 8 or struct.unpack_from("<Q", data)[0] != self.number:
+            raise self._lost("it sent something else than an answer")
+        try:
+            return wire.decode(data[8:])
+        except wire.Garbage:
+            raise self._lost("it sent something else than an answer") from None
+
+    def _receive(self, seconds: float) -> bytes:
+        """One message within the time."""
+        deadline, data, want = time.monotonic() + seconds, bytearray(), 8
+        while len(data) < want:
+            left = deadline - time.monotonic()
+            if left <= 0 or not select.select([self.channel], [], [], left)[0]:
+                raise self._lost(f"no answer within {seconds:g} s: does a loop never end?")
+            try:
+                part = self.channel.recv(min(want - len(data), 1 << 20))
+            except OSError:
+                part = b""
+            if not part:
+                raise self._lost(ENDED)
+            data += part
+            if want == 8 and len(data) == 8:
+                want += struct.unpack("<Q", data)[0]
+                if want > wire.MOST + 8:
+                    raise self._lost("it sent something else than an answer, or one above 64 MB")
+        return bytes(data[8:])
+
+
+def _descendants(pid: int) -> list[int]:
+    """Processes below `pid`, where no bubblewrap ends them together."""
+    parents = {}
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
+            try:
+                parents[int(entry.name)] = int((entry / "stat").read_text().rsplit(")", 1)[1].split()[1])
+            except (OSError, IndexError, ValueError):
+                continue
+    found = [pid]
+    for p in found:
+        found += [child for child, parent in parents.items() if parent == p]
+    return found[1:]
+
+
+def _kill(pid: int) -> None:
+    with contextlib.suppress(ProcessLookupError):
+        os.kill(pid, signal.SIGKILL)

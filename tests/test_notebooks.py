@@ -1,0 +1,108 @@
+"""The notebooks: the student version is the source without its answers, and the two agree with the checks."""
+
+import ast
+import re
+
+import nbformat
+import pytest
+
+from solutions.__main__ import NOTEBOOKS, ROOT, sources, student
+from tests.grade.__main__ import grade, main
+from tests.grade.exercise import everything
+from tests.grade.submission import STUB
+
+ALL = everything()
+SOURCES = sources()
+by_name = pytest.mark.parametrize("path", SOURCES, ids=lambda p: p.stem)
+
+
+def of(path):
+    """The exercises of a notebook."""
+    return [e for id, e in ALL.items() if int(id.split(".")[0]) == int(path.stem[:2])]
+
+
+def grading(notebook):
+    """grade id -> cell."""
+    cells = [c for c in notebook.cells if "nbgrader" in c.metadata]
+    return {c.metadata.nbgrader.grade_id: c for c in cells}
+
+
+def test_every_exercise_belongs_to_a_notebook():
+    assert len(SOURCES) == 11
+    assert {e.id for path in SOURCES for e in of(path)} == set(ALL)
+
+
+@by_name
+def test_the_student_version_is_made_from_the_source(path):
+    """`python -m solutions release` was run after the last change."""
+    assert (NOTEBOOKS / path.name).read_text() == student(path)
+
+
+def test_nothing_else_is_among_the_notebooks():
+    assert sorted(p.name for p in NOTEBOOKS.iterdir()) == [p.name for p in SOURCES]
+
+
+@by_name
+def test_a_notebook_has_two_to_five_exercises_each_with_its_check(path):
+    cells, exercises = grading(nbformat.read(path, 4)), of(path)
+    assert 2 <= len(exercises) <= 5
+    ids = {e.grade_id for e in exercises}
+    assert set(cells) == ids | {id.replace("ex-", "check-") for id in ids}
+    for e in exercises:
+        task, check = cells[e.grade_id], cells[e.grade_id.replace("ex-", "check-")]
+        assert task.source.startswith(f"# Exercise {e.id}\n") and e.name in task.source
+        assert check.source.startswith(f'check("{e.id}")') and check.metadata.nbgrader.points == e.points
+
+
+@by_name
+def test_no_answer_is_left_in_the_student_version(path):
+    notebook = nbformat.read(NOTEBOOKS / path.name, 4)
+    text = "\n".join(c.source for c in notebook.cells)
+    assert not re.search("SOLUTION|HIDDEN", text)
+    assert text.count(STUB) == len(of(path))
+
+
+@pytest.mark.parametrize("path", [p for s in SOURCES for p in (s, NOTEBOOKS / s.name)], ids=str)
+def test_no_outputs_and_no_machines_paths_are_stored(path):
+    notebook = nbformat.read(path, 4)
+    assert all(not c.outputs and c.execution_count is None for c in notebook.cells if c.cell_type == "code")
+    assert not re.search(r"/home/|/root/|/tmp/|/work/|/Users/", path.read_text())
+    assert "/" not in str(dict(notebook.metadata))
+
+
+@by_name
+def test_no_cell_is_longer_than_a_screen(path):
+    """25 lines; an exercise's cell may hold its marks and its text besides."""
+    for cell in nbformat.read(path, 4).cells:
+        if cell.cell_type == "code" and "nbgrader" not in cell.metadata:
+            assert len(cell.source.splitlines()) <= 25, cell.source[:200]
+
+
+@by_name
+def test_it_is_python_and_asks_a_question_first(path):
+    notebook = nbformat.read(path, 4)
+    for cell in notebook.cells:
+        if cell.cell_type == "code":
+            ast.parse(cell.source)
+    title = notebook.cells[0].source
+    assert title.startswith(f"# {int(path.stem[:2])}. ") and "question" in title and "?" in title
+
+
+def test_the_solutions_earn_every_point_in_the_sandbox():
+    results, notes = grade(ROOT / "solutions", list(ALL))
+    assert not notes
+    wrong = [(r.id, r.lines()) for r in results if r.points < r.most]
+    assert not wrong
+
+
+def test_untouched_student_notebooks_earn_nothing(tmp_path):
+    results, notes = grade(NOTEBOOKS, list(ALL))
+    assert not notes
+    assert [r.points for r in results] == [0] * len(ALL) and all(r.open for r in results)
+
+
+def test_by_default_the_notebooks_that_were_handed_in_are_graded(tmp_path, capsys):
+    (tmp_path / "class" / "ann").mkdir(parents=True)
+    (tmp_path / "class" / "ann" / "n.ipynb").write_text((NOTEBOOKS / SOURCES[6].name).read_text())
+    assert main([str(tmp_path / "class"), "--out", str(tmp_path / "out")]) == 0
+    assert f"ann: 0 of {sum(e.points for e in of(SOURCES[6])):g}" in capsys.readouterr().out
