@@ -3,8 +3,8 @@
 In: a Gymnasium environment with vector observations and actions in [-1, 1]. Out: a policy and a log
 with a row an episode. Not in the publication: LayerNorm in the critics (keeps Q from running away when
 steps are few), running normalisation of observations, a learning rate that falls towards the end, an
-averaged actor that acts at test time while the raw one explores, and the choice of the best actor of a
-training by its returns.
+averaged actor that acts at test time while the raw one explores, and a last round without noise in which
+the best actors of the training compete.
 """
 
 from __future__ import annotations
@@ -22,7 +22,9 @@ from .training import Checkpoint, load_state, progress, save_state, seed_everyth
 
 LOG_STD_MIN, LOG_STD_MAX = -5.0, 2.0  # exp(-5) acts as good as deterministic; exp(2) is past tanh's ends
 ENTROPY = -2.0  # aimed at, per action; the published -1 is noise of 0.09, too much to dose a hit within 5 %
-WINDOW = 10  # episodes whose mean return judges an actor
+WINDOW = 10  # episodes whose mean return makes the actors at their end candidates
+CANDIDATES = 4  # windows that are kept: training goes up and down
+TRIALS = 5  # episodes without noise for each candidate; with noise an actor may dose a hit, without overshoot
 FALL_FROM = 0.3  # of the training: from here the learning rate falls to 0; on slide 38 of 40 for 34 without
 MIN_OBS_STD = 0.02  # below it is a keypoint's noise: dividing by less would blow the noise up to a signal
 
@@ -209,6 +211,10 @@ class SAC:
             "entropy": entropy.item(),
         }
 
+    def actors(self) -> list[dict]:
+        """Copies of the raw and the averaged actor's state."""
+        return [deepcopy(actor.state_dict()) for actor in (self.actor, self.test_actor)]
+
     def _modules(self):
         return {n: getattr(self, n) for n in ("actor", "critic", "test_actor", "target", "optimizer")}
 
@@ -257,24 +263,23 @@ def train(
     after `random_steps` uniformly random ones. evaluate(sac) -> dict joins the log every
     `evaluate_every` episodes. recipe: arguments of `SAC`. Returns the agent and the log, a row an
     episode. A resumed run does what the killed one would have done: each episode starts from
-    (seed, episode), and checkpoints are taken between episodes. The agent's test-time actor is that of
-    the moment when the mean return of `WINDOW` episodes was best: training goes up and down.
+    (seed, episode), and checkpoints are taken between episodes. The agent's test-time actor is chosen at
+    the end, by return: see `best_actor`.
     """
     checkpoint = checkpoint or Checkpoint(None)
     rng = seed_everything(seed)
     obs_dim, action_dim = env.observation_space.shape[0], env.action_space.shape[0]
     sac = SAC(obs_dim, action_dim, **recipe)
     buffer = ReplayBuffer(obs_dim, action_dim, steps + 1000)  # a short run can keep all it has seen
-    log, step, best, best_return = [], 0, sac.test_actor.state_dict(), -math.inf
+    log, step, candidates = [], 0, []
     if saved := checkpoint.load():
         sac.load_state(saved["sac"])
-        best, best_return = saved["best"], saved["best_return"]
+        candidates = saved["candidates"]
         buffer.load_state(saved["buffer"])
         rng.bit_generator.state, log, step = saved["rng"], saved["log"], saved["step"]
 
     def state():
-        rest = {"rng": rng.bit_generator.state, "log": log, "step": step}
-        rest |= {"best": best, "best_return": best_return}
+        rest = {"rng": rng.bit_generator.state, "log": log, "step": step, "candidates": candidates}
         return {"sac": sac.state(), "buffer": buffer.state()} | rest
 
     bar = progress(steps, "policy", step)
@@ -301,14 +306,32 @@ def train(
         if evaluate and len(log) % evaluate_every == evaluate_every - 1:
             row |= evaluate(sac)
         log.append(row)
-        recent = np.mean([r["return"] for r in log[-WINDOW:]])
-        if recent > best_return and len(log) >= WINDOW:
-            best, best_return = deepcopy(sac.test_actor.state_dict()), float(recent)
+        if len(log) % WINDOW == 0:
+            mean = float(np.mean([r["return"] for r in log[-WINDOW:]]))
+            candidates.append({"return": mean, "actors": sac.actors()})
+            candidates = sorted(candidates, key=lambda c: -c["return"])[:CANDIDATES]
         bar.set_postfix_str(f"return {row['return']:.2f}", refresh=False)
         bar.update(len(rows))
         checkpoint.save(state)
     bar.close()
     checkpoint.save(state, force=True)
-    if best_return > -math.inf:
-        sac.test_actor.load_state_dict(best)
+    actors = [actor for c in candidates for actor in c["actors"]] + sac.actors()
+    sac.test_actor.load_state_dict(best_actor(env, sac, actors, seed))
     return sac, log
+
+
+def best_actor(env, sac: SAC, actors: list[dict], seed: int) -> dict:
+    """Of `actors`, state dicts, the one that earns most in `TRIALS` episodes without noise, alike for all."""
+
+    def mean_return(actor):
+        sac.test_actor.load_state_dict(actor)
+        total = 0.0
+        for i in range(TRIALS):
+            obs, _ = env.reset(seed=int(np.random.SeedSequence([seed, i, 1]).generate_state(1)[0]))
+            ended = False
+            while not ended:
+                obs, reward, terminal, truncated, _ = env.step(sac.act(obs, deterministic=True))
+                total, ended = total + float(reward), terminal or truncated
+        return total / TRIALS
+
+    return max(actors, key=mean_return)

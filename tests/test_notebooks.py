@@ -1,7 +1,10 @@
 """The notebooks: the student version is the source without its answers, and the two agree with the checks."""
 
 import ast
+import os
 import re
+import subprocess
+import sys
 
 import nbformat
 import pytest
@@ -9,6 +12,7 @@ import pytest
 from solutions.__main__ import NOTEBOOKS, ROOT, sources, student
 from tests.grade.__main__ import grade, main
 from tests.grade.exercise import everything
+from tests.grade.notebook import StillOpen
 from tests.grade.submission import STUB
 
 ALL = everything()
@@ -86,6 +90,28 @@ def test_it_is_python_and_asks_a_question_first(path):
             ast.parse(cell.source)
     title = notebook.cells[0].source
     assert title.startswith(f"# {int(path.stem[:2])}. ") and "question" in title and "?" in title
+
+
+@pytest.mark.slow
+@by_name
+def test_a_solution_runs_headless_within_two_minutes(path, tmp_path):
+    command = [sys.executable, "-m", "jupyter", "nbconvert", "--to", "notebook", "--execute", str(path)]
+    where = ["--output-dir", str(tmp_path)]
+    subprocess.run([*command, *where], check=True, timeout=120, env=os.environ | {"LBW_FAST": "1"})
+
+
+@by_name
+def test_the_student_version_stops_at_its_first_exercise_with_one_sentence(path):
+    """Its cells up to there are those of the solution; what is raised there shows no traceback."""
+    notebook = nbformat.read(NOTEBOOKS / path.name, 4)
+    kinds = [c.metadata.get("nbgrader", {}).get("grade_id", "") for c in notebook.cells]
+    first = kinds.index(of(path)[0].grade_id)
+    assert next(k for k in kinds[first + 1 :] if k) == of(path)[0].grade_id.replace("ex-", "check-")
+    space = {}
+    exec(f"import torch, numpy as np\nfrom tests.grade import check\n{notebook.cells[first].source}", space)
+    with pytest.raises(StillOpen, match="still open") as stop:
+        exec(f'check("{of(path)[0].id}")', space)
+    assert len(stop.value._render_traceback_()) == 1
 
 
 def test_the_solutions_earn_every_point_in_the_sandbox():

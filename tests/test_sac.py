@@ -1,12 +1,14 @@
 """Soft actor-critic against its equations, and against the mistakes others made before."""
 
+from copy import deepcopy
+
 import gymnasium as gym
 import numpy as np
 import pytest
 import torch
 
 from lbw_minimal import sac as module
-from lbw_minimal.sac import SAC, Actor, ReplayBuffer, TwinCritic, train
+from lbw_minimal.sac import SAC, Actor, ReplayBuffer, TwinCritic, best_actor, train
 from lbw_minimal.training import Checkpoint
 
 
@@ -233,28 +235,50 @@ def test_the_log_has_reward_parts_losses_and_evaluations():
     assert [("test" in row) for row in log] == [False, True, False, True] and len(seen) == 2
 
 
-def test_the_best_actor_of_a_training_stays(monkeypatch):
-    """Returns rise for 12 episodes and then fall: the actor that is kept is that of the twelfth."""
-    import lbw_minimal.sac as module
+def test_the_actor_that_earns_most_without_noise_is_chosen():
+    env, sac, actors = Walk(), SAC(1, 1, width=8), []
+    for bias in (-3.0, 0.1, 3.0):  # walks left, hardly, or off to the right
+        for p in sac.test_actor.parameters():
+            torch.nn.init.zeros_(p)
+        sac.test_actor.net[-1].bias.data[0] = bias
+        actors.append(deepcopy(sac.test_actor.state_dict()))
+
+    def earned(actor):
+        sac.test_actor.load_state_dict(actor)
+        obs, _ = env.reset(seed=5)
+        total, ended = 0, False
+        while not ended:
+            obs, reward, terminal, late, _ = env.step(sac.act(obs, deterministic=True))
+            total, ended = total + reward, terminal or late
+        return total
+
+    for order in (actors, actors[::-1]):
+        assert best_actor(env, sac, order, seed=0) is max(actors, key=earned)
+
+
+def test_actors_of_the_best_windows_and_of_the_end_compete(monkeypatch):
+    """Returns of 40 episodes rise and fall: of four windows of ten, two are kept, and the end joins."""
+    seen = []
 
     class Tide(Walk):
         def step(self, action):
             obs, _, terminal, late, info = super().step(action)
-            return obs, -abs(self.episode - 12.0), terminal, late, info
+            return obs, -abs(self.episode - 25.0), terminal, late, info
 
         def reset(self, seed=None, options=None):
             self.episode = getattr(self, "episode", 0) + 1
             return super().reset(seed=seed)
 
-    monkeypatch.setattr(module, "WINDOW", 1)
-    monkeypatch.setattr(SAC, "slow_down", lambda self, passed: None)  # both trainings at the same pace
-    recipe = dict(seed=0, random_steps=20, width=8, batch=8)
-    kept, log = train(Tide(), steps=400, **recipe)
-    assert len(log) == 20 and max(log, key=lambda row: row["return"])["episode"] == 11
-    stopped, _ = train(Tide(), steps=240, **recipe)
-    for p, q in zip(kept.test_actor.parameters(), stopped.test_actor.parameters(), strict=True):
+    def choose(env, sac, actors, seed):
+        seen.extend(actors)
+        return actors[2]
+
+    monkeypatch.setattr(module, "CANDIDATES", 2)
+    monkeypatch.setattr(module, "best_actor", choose)
+    kept, log = train(Tide(), steps=800, seed=0, random_steps=20, width=8, batch=8)
+    assert len(log) == 40 and len(seen) == 6
+    for p, q in zip(kept.test_actor.state_dict().values(), seen[2].values(), strict=True):
         assert torch.equal(p, q)
-    assert not torch.equal(kept.actor.net[0].weight, stopped.actor.net[0].weight)
 
 
 def test_the_learning_rates_stay_then_fall_to_zero():

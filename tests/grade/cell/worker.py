@@ -60,16 +60,14 @@ DENIED = {
     "bind": 49, "ptrace": 101, "process_vm_readv": 310, "process_vm_writev": 311, "setsid": 112,
     "creat": 85, "truncate": 76, "rename": 82, "renameat": 264, "renameat2": 316, "unlink": 87,
     "unlinkat": 263, "mkdir": 83, "mkdirat": 258, "rmdir": 84, "symlink": 88, "symlinkat": 266, "link": 86,
-    "linkat": 265, "chmod": 90, "fchmod": 91, "fchmodat": 268, "chown": 92, "mount": 165, "unshare": 272, "setns": 308,
-    "bpf": 321, "keyctl": 250, "memfd_create": 319, "io_uring_setup": 425, "io_uring_enter": 426,
-    "pidfd_open": 434, "pidfd_send_signal": 424, "openat2": 437, "fchmodat2": 452, "setpriority": 141,
-    "rt_sigqueueinfo": 129, "rt_tgsigqueueinfo": 297, "setrlimit": 160, "tkill": 200,
+    "linkat": 265, "chmod": 90, "fchmod": 91, "fchmodat": 268, "chown": 92, "mount": 165, "unshare": 272,
+    "setns": 308, "bpf": 321, "keyctl": 250, "memfd_create": 319, "io_uring_setup": 425,
+    "io_uring_enter": 426, "pidfd_open": 434, "pidfd_send_signal": 424, "openat2": 437, "fchmodat2": 452,
+    "setpriority": 141, "rt_sigqueueinfo": 129, "rt_tgsigqueueinfo": 297, "setrlimit": 160, "tkill": 200,
 }  # fmt: skip
 KILL, TGKILL, PRLIMIT, CLONE, CLONE3, OPEN, OPENAT = 62, 234, 302, 56, 435, 2, 257
-CLONE_THREAD, WRITING = (
-    0x10000,
-    0x1 | 0x2 | 0x40 | 0x200 | 0x400,
-)  # O_WRONLY, O_RDWR, O_CREAT, O_TRUNC, O_APPEND
+CLONE_THREAD = 0x10000
+WRITING = 0x1 | 0x2 | 0x40 | 0x200 | 0x400  # O_WRONLY, O_RDWR, O_CREAT, O_TRUNC, O_APPEND
 
 
 def filter_calls() -> None:
