@@ -30,7 +30,7 @@ import torch
 
 import tasks
 from lbw_minimal import sac, video
-from lbw_minimal.imitate import Run, imitate, learn_perception, load_perception
+from lbw_minimal.imitate import PACE, Run, imitate, learn_perception, load_perception
 from lbw_minimal.report import wilson, write_report
 from lbw_minimal.reward import MENDS
 from lbw_minimal.training import InputError, pick_device, seed_everything, write_atomic
@@ -136,7 +136,7 @@ def run(args):
 
     start = time.monotonic()
     films = gym.make(tasks.id_of(name)).unwrapped
-    frames = recipe.robot_frames if from_scratch else min(400, recipe.robot_frames)
+    frames = recipe.robot_frames if from_scratch else min(PACE, recipe.robot_frames)
     robot, _ = record_random(films, frames, seed=args.seed)
     here.metrics["stages"]["robot_video"] = round(time.monotonic() - start, 1)
 

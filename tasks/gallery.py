@@ -14,7 +14,7 @@ import numpy as np
 
 import tasks
 from lbw_minimal import sac, video
-from lbw_minimal.imitate import load_perception, watched
+from lbw_minimal.imitate import PACE, load_perception, watched
 from lbw_minimal.report import CSS, data_uri, demonstration, draw_keypoints, film, picture
 from lbw_minimal.training import InputError, write_atomic
 from tasks.viewer import mirror
@@ -55,7 +55,7 @@ def write(out: Path) -> Path:
         demo, _ = video.read(tasks.VIDEOS / name / "expert_01.mp4")
         perception = load_perception(tasks.WEIGHTS / name, name)
         perception.watch(demo)
-        robot, _ = record_random(gym.make(tasks.id_of(name)).unwrapped, 400, seed=0)
+        robot, _ = record_random(gym.make(tasks.id_of(name)).unwrapped, PACE, seed=0)
         agent = sac.load(tasks.WEIGHTS / name / "policy.safetensors")
         env, reward = watched(gym.make(tasks.id_of(name)), perception, robot)
         frames, z, won = rollout(
