@@ -22,7 +22,6 @@ from lbw_minimal.reward import KeypointReward
 from lbw_minimal.training import Checkpoint, write_atomic
 from lbw_minimal.wrappers import KeypointObservation, KeypointRewardWrapper
 
-
 PACE = 400  # frames of random robot motion that show its pace; so few are filmed again in a second or two,
 # and a policy is followed up with the very reward it was trained on
 
