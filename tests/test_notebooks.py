@@ -63,7 +63,7 @@ def test_no_answer_is_left_in_the_student_version(path):
     notebook = nbformat.read(NOTEBOOKS / path.name, 4)
     text = "\n".join(c.source for c in notebook.cells)
     assert not re.search("SOLUTION|HIDDEN", text)
-    assert text.count(STUB) == len(of(path))
+    assert text.count(STUB) >= len(of(path))
 
 
 @pytest.mark.parametrize("path", [p for s in SOURCES for p in (s, NOTEBOOKS / s.name)], ids=str)

@@ -118,21 +118,24 @@ class Exercise:
 def exercise(id: str, title: str, *, given: tuple = (), probe: str = ""):
     """Make an exercise of the function or class below.
 
-    given: functions, classes or other exercises that the answer may use. probe: see Exercise.
+    given: functions, classes, lines of code or other exercises that the answer may use. probe: see Exercise.
     """
 
     def wrap(thing) -> Exercise:
         source = textwrap.dedent(inspect.getsource(thing))
         source = source[min(source.find(word) for word in ("\ndef ", "\nclass ") if word in source) + 1 :]
-        texts = (
-            g.source if isinstance(g, Exercise) else textwrap.dedent(inspect.getsource(g)) for g in given
-        )
-        before = "\n\n".join(texts)
+        before = "\n\n".join(map(_text, given))
         name = thing.__name__
         call = textwrap.dedent(probe) or f"probe = {name}\n"
         return Exercise(id, title, name, source, before, call)
 
     return wrap
+
+
+def _text(given) -> str:
+    if isinstance(given, Exercise | str):
+        return getattr(given, "source", given)
+    return textwrap.dedent(inspect.getsource(given))
 
 
 def everything() -> dict[str, Exercise]:

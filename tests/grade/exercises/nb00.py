@@ -1,0 +1,59 @@
+"""Notebook 0, start here: pixels, keypoints and success."""
+
+import numpy as np
+
+from tests.grade.exercise import exercise
+
+
+@exercise("0.1", "How often did it work?")
+def success_rate(distances, threshold):
+    return float((distances < threshold).mean())
+
+
+success_rate.check("ten episodes", lambda rng: (rng.uniform(0, 0.1, 10), 0.05))
+success_rate.check("any number of episodes, any threshold", lambda rng: (rng.uniform(0, 1, 37), 0.3))
+success_rate.check("all of them", lambda rng: (rng.uniform(0, 0.04, 5), 0.05))
+success_rate.mistake(
+    "You count the failures: an episode succeeds where its distance is below the threshold.",
+    "distances < threshold",
+    "distances > threshold",
+)
+success_rate.mistake(
+    "You return how many succeeded; a rate is that number divided by all episodes.", ".mean()", ".sum()"
+)
+success_rate.mistake(
+    "You return per cent; a rate lies between 0 and 1.",
+    "(distances < threshold).mean()",
+    "100 * (distances < threshold).mean()",
+)
+success_rate.mistake(
+    "You divide by ten; divide by the number of episodes there are.",
+    "(distances < threshold).mean()",
+    "(distances < threshold).sum() / 10",
+)
+
+
+@exercise("0.2", "From keypoint to pixel")
+def to_pixels(z, size):
+    return (z + 1) / 2 * size
+
+
+to_pixels.check("keypoints anywhere", lambda rng: (rng.uniform(-1, 1, (5, 2)), 84))
+to_pixels.check("a whole trajectory, another size", lambda rng: (rng.uniform(-1, 1, (9, 5, 2)), 200))
+to_pixels.check("the corners", lambda rng: (np.array([[-1.0, -1.0], [1.0, 1.0]]), 84))
+to_pixels.mistake(
+    "y already runs down in keypoints, as rows do in a picture: it needs no turning round.",
+    "return (z + 1) / 2 * size",
+    "z = z * (1, -1)\n    return (z + 1) / 2 * size",
+)
+to_pixels.mistake(
+    "-1 is the left edge, so it becomes pixel 0: add 1 before you scale.",
+    "(z + 1) / 2 * size",
+    "z / 2 * size",
+)
+to_pixels.mistake(
+    "From -1 to 1 it is 2 units, from edge to edge `size` pixels: halve.", "(z + 1) / 2", "(z + 1)"
+)
+to_pixels.mistake(
+    "x comes first in both: column before row.", "(z + 1) / 2 * size", "(z[..., ::-1] + 1) / 2 * size"
+)

@@ -1,0 +1,163 @@
+"""Notebook 1, reach: a critically damped tip by Operational Space Control, and an environment."""
+
+import gymnasium as gym
+import numpy as np
+
+from tests.grade.exercise import exercise
+
+
+@exercise("1.1", "A spring that does not overshoot")
+def response(t, x0, kp):
+    w = np.sqrt(kp)
+    return x0 * (1 + w * t) * np.exp(-w * t)
+
+
+def _spring(rng):
+    return np.linspace(0, 0.5, 20), float(rng.uniform(0.01, 0.3)), float(rng.uniform(50, 1600))
+
+
+response.check("any stiffness, any distance", _spring, rtol=1e-4, atol=1e-8)
+response.check("at t = 0 it is x0", lambda rng: (np.zeros(1), float(rng.uniform(0.1, 1)), 400.0))
+response.mistake("kp is the square of the natural frequency: take its root.", "np.sqrt(kp)", "kp")
+response.mistake(
+    "It starts at rest; exp(-wt) alone starts with a jerk: the factor 1 + w t is missing.",
+    "(1 + w * t) * ",
+    "",
+)
+response.mistake("That oscillates: with kd = 2 sqrt(kp) there is no cosine.", "(1 + w * t)", "np.cos(w * t)")
+response.mistake("Your spring runs away: the exponent is negative.", "np.exp(-w * t)", "np.exp(w * t)")
+
+
+def _arm(rng):
+    J, A = rng.normal(size=(6, 7)), rng.normal(size=(7, 7))
+    return J, A @ A.T + 7 * np.eye(7)
+
+
+@exercise("1.2", "The inertia that the tip feels")
+def task_inertia(J, M):
+    return np.linalg.inv(J @ np.linalg.inv(M) @ J.T)
+
+
+task_inertia.check("a seven-joint arm", _arm)
+task_inertia.check(
+    "a two-joint arm, one direction", lambda rng: (rng.normal(size=(1, 2)), np.diag([2.0, 0.5]))
+)
+task_inertia.mistake(
+    "You left out the last inverse: J M^-1 J^T is mobility, Lambda is its inverse.",
+    "np.linalg.inv(J @ np.linalg.inv(M) @ J.T)",
+    "J @ np.linalg.inv(M) @ J.T",
+)
+task_inertia.mistake(
+    "Mobilities add up along J, inertias do not: M has to be inverted inside.", "np.linalg.inv(M)", "M"
+)
+task_inertia.mistake(
+    "J maps joints to the tip, (6, 7): the transpose goes last.", "J @ np.linalg.inv(M) @ J.T", "J.T @ J"
+)
+
+
+@exercise("1.3", "The torque of Operational Space Control", given=(task_inertia,))
+def osc(J, M, h, e, v, kp):
+    kd = 2 * np.sqrt(kp)
+    return J.T @ task_inertia(J, M) @ (kp * e - kd * v) + h
+
+
+def _errors(rng):
+    return *_arm(rng), rng.normal(size=7), rng.normal(size=6), rng.normal(size=6), float(rng.uniform(50, 900))
+
+
+osc.check("an arm on its way", _errors, points=2)
+osc.check(
+    "at the goal and at rest only gravity is left",
+    lambda rng: (*_arm(rng), rng.normal(size=7), np.zeros(6), np.zeros(6), 400.0),
+)
+osc.mistake("Nothing holds the arm up: gravity and Coriolis torques, h, have to be added.", " + h", "")
+osc.mistake(
+    "Without Lambda the gains are forces, not accelerations: stiff in one pose, slack in another.",
+    "task_inertia(J, M) @ ",
+    "",
+)
+osc.mistake("Damping pulls against the speed: its sign is minus.", "- kd * v", "+ kd * v")
+osc.mistake("Critical damping is kd = 2 sqrt(kp).", "2 * np.sqrt(kp)", "np.sqrt(kp)")
+
+
+@exercise("1.4", "Torques the tip does not feel", given=(task_inertia,))
+def nullspace(J, M):
+    return np.eye(len(M)) - J.T @ task_inertia(J, M) @ J @ np.linalg.inv(M)
+
+
+nullspace.check("a seven-joint arm", _arm, points=2)
+nullspace.check(
+    "a three-joint arm, two directions",
+    lambda rng: (rng.normal(size=(2, 3)), np.diag(rng.uniform(0.5, 2, 3))),
+)
+nullspace.mistake(
+    "That is the projector of geometry, for velocities: forces need the one weighted with M.",
+    "J.T @ task_inertia(J, M) @ J @ np.linalg.inv(M)",
+    "np.linalg.pinv(J) @ J",
+)
+nullspace.mistake(
+    "You return the part the tip does feel: subtract it from the identity.", "np.eye(len(M)) - ", ""
+)
+nullspace.mistake(
+    "That is N, which acts on velocities; torques need its transpose.",
+    "J.T @ task_inertia(J, M) @ J @ np.linalg.inv(M)",
+    "np.linalg.inv(M) @ J.T @ task_inertia(J, M) @ J",
+)
+
+
+@exercise(
+    "1.5",
+    "An environment",
+    given=("import gymnasium as gym",),
+    probe="""
+    def probe(actions, seed):
+        env = Point()
+        start, info = env.reset(seed=seed)
+        rows = [env.step(action) for action in actions]
+        obs, reward, terminated, truncated, infos = zip(*rows)
+        return {
+            "start": start, "obs": np.stack(obs), "reward": np.array(reward, float),
+            "terminated": [bool(x) for x in terminated], "truncated": [bool(x) for x in truncated],
+            "success": [bool(i["is_success"]) for i in infos],
+        }
+    """,
+)
+class Point(gym.Env):
+    observation_space = gym.spaces.Box(-2, 2, (1,), np.float32)
+    action_space = gym.spaces.Box(-1, 1, (1,), np.float32)
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self.x, self.t = self.np_random.uniform(-1, 1), 0
+        return np.array([self.x], np.float32), {}
+
+    def step(self, action):
+        self.x += 0.05 * float(np.clip(action[0], -1, 1))
+        self.t += 1
+        done = abs(self.x) < 0.05
+        return np.array([self.x], np.float32), float(done), False, self.t >= 50, {"is_success": done}
+
+
+Point.check("a random walk", lambda rng: (rng.uniform(-1, 1, (20, 1)), int(rng.integers(1000))))
+Point.check(
+    "actions out of bounds are clipped", lambda rng: (rng.uniform(-4, 4, (20, 1)), int(rng.integers(1000)))
+)
+Point.check("after 50 steps it is truncated, never terminated", lambda rng: (rng.uniform(-1, 1, (51, 1)), 3))
+Point.mistake(
+    "The seed never reaches the generator: call super().reset(seed=seed) first.",
+    "super().reset(seed=seed)",
+    "super().reset(seed=None if seed is None else seed + 1)",
+)
+Point.mistake(
+    "Actions may lie out of bounds: clip them to [-1, 1].",
+    "float(np.clip(action[0], -1, 1))",
+    "float(action[0])",
+)
+Point.mistake(
+    "The time limit is the clock's doing, not the task's end: it belongs into truncated.",
+    "False, self.t >= 50",
+    "self.t >= 50, False",
+)
+Point.mistake(
+    "The fiftieth step is the last: count steps, and compare with >=.", "self.t >= 50", "self.t > 50"
+)

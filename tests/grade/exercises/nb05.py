@@ -1,0 +1,211 @@
+"""Notebook 5, Transporter: from heat map to keypoint to transport (Eq. 6-7)."""
+
+import numpy as np
+import torch
+
+from tests.grade.exercise import exercise
+
+
+def _tensor(rng, *shape, scale=1.0):
+    return torch.from_numpy(np.float32(scale * rng.normal(size=shape)))
+
+
+def _peaks(rng, B=2, K=3, h=7, w=9):
+    """Logits with one clear peak a map, off the diagonal, on a map that is no square."""
+    logits = np.zeros((B, K, h, w), np.float32)
+    for b in range(B):
+        for k in range(K):
+            logits[b, k, rng.integers(h), rng.integers(w)] = 20
+    return torch.from_numpy(logits)
+
+
+@exercise("5.1", "From heat map to keypoint")
+def soft_argmax(logits):
+    h, w = logits.shape[2:]
+    p = logits.flatten(2).softmax(-1).view(logits.shape)
+    x = (2 * torch.arange(w) + 1) / w - 1
+    y = (2 * torch.arange(h) + 1) / h - 1
+    return torch.stack([(p.sum(2) * x).sum(-1), (p.sum(3) * y).sum(-1)], -1)
+
+
+soft_argmax.check("a clear peak is found where it is", lambda rng: (_peaks(rng),))
+soft_argmax.check("two things share the probability", lambda rng: (_tensor(rng, 2, 5, 21, 21, scale=2),))
+soft_argmax.check("logits as large as 200", lambda rng: (_tensor(rng, 1, 4, 8, 6, scale=200),))
+soft_argmax.mistake(
+    "x and y are swapped: x runs along the last axis, to the right, and comes first.",
+    "torch.stack([(p.sum(2) * x).sum(-1), (p.sum(3) * y).sum(-1)], -1)",
+    "torch.stack([(p.sum(3) * y).sum(-1), (p.sum(2) * x).sum(-1)], -1)",
+)
+soft_argmax.mistake(
+    "Your cells run from edge to edge: cell 0's centre is half a cell inside, at 1 / w - 1.",
+    "(2 * torch.arange(w) + 1) / w - 1",
+    "torch.linspace(-1, 1, w)",
+    "(2 * torch.arange(h) + 1) / h - 1",
+    "torch.linspace(-1, 1, h)",
+)
+soft_argmax.mistake(
+    "Your softmax does not go over the whole map of one keypoint: flatten its h * w cells first.",
+    "logits.flatten(2).softmax(-1).view(logits.shape)",
+    "logits.softmax(-1) / logits.shape[2]",
+)
+soft_argmax.mistake(
+    "Return places in [-1, 1], not cell numbers.",
+    "(2 * torch.arange(w) + 1) / w - 1",
+    "1.0 * torch.arange(w)",
+    "(2 * torch.arange(h) + 1) / h - 1",
+    "1.0 * torch.arange(h)",
+)
+soft_argmax.mistake(
+    "exp of a large logit overflows: use softmax, which subtracts the largest first.",
+    "logits.flatten(2).softmax(-1)",
+    "(logits.flatten(2).exp() / logits.flatten(2).exp().sum(-1, keepdim=True))",
+)
+
+
+@exercise("5.2", "One map per image (the H of Eq. 6)")
+def heat_map(z, sigma, size):
+    cells = (2 * torch.arange(size) + 1) / size - 1
+    x = torch.exp(-(((cells - z[..., 0, None]) / sigma) ** 2))
+    y = torch.exp(-(((cells - z[..., 1, None]) / sigma) ** 2))
+    h = y[..., :, None] * x[..., None, :]
+    return 1 - (1 - h).prod(1, keepdim=True)
+
+
+def _points(rng, K=5):
+    return torch.from_numpy(np.float32(rng.uniform(-0.9, 0.9, (3, K, 2))))
+
+
+heat_map.check("keypoints apart", lambda rng: (_points(rng, 1), 0.1, 21))
+heat_map.check("keypoints anywhere", lambda rng: (_points(rng), 0.2, 21))
+heat_map.check(
+    "two on one spot: no value above 1", lambda rng: (_points(rng, 1).expand(3, 4, 2).clone(), 0.3, 15)
+)
+heat_map.mistake(
+    "Your maps sum past 1 where keypoints meet: Eq. 6 wants one H per image, the chance that any covers a cell.",
+    "1 - (1 - h).prod(1, keepdim=True)",
+    "h.sum(1, keepdim=True)",
+)
+heat_map.mistake(
+    "Eq. 6 wants one H per image; you return one map per keypoint.",
+    "1 - (1 - h).prod(1, keepdim=True)",
+    "h",
+)
+heat_map.mistake(
+    "x and y are swapped: y picks the row, x the column.",
+    "y[..., :, None] * x[..., None, :]",
+    "x[..., :, None] * y[..., None, :]",
+)
+heat_map.mistake(
+    "The Gaussian here is exp(-d^2 / sigma^2), without a factor 2.",
+    "/ sigma) ** 2",
+    "/ sigma) ** 2 / 2",
+)
+heat_map.mistake(
+    "Keep a dimension of size 1 for the channels, so that H multiplies features of any number of them.",
+    "prod(1, keepdim=True)",
+    "prod(1)",
+)
+
+
+@exercise("5.3", "Transport (Eq. 6)")
+def transport(phi_x, phi_y, h_x, h_y):
+    phi_x, h_x = phi_x.detach(), h_x.detach()
+    return (1 - h_x) * (1 - h_y) * phi_x + h_y * phi_y
+
+
+def _features(rng):
+    h = [torch.from_numpy(np.float32(rng.uniform(0, 1, (2, 1, 6, 6)))) for _ in range(2)]
+    return _tensor(rng, 2, 4, 6, 6), _tensor(rng, 2, 4, 6, 6), *h
+
+
+transport.check("features and maps anywhere", _features, points=2)
+transport.check(
+    "where neither frame has a keypoint, the source stays",
+    lambda rng: (*_features(rng)[:2], torch.zeros(2, 1, 6, 6), torch.zeros(2, 1, 6, 6)),
+)
+transport.mistake(
+    "The source is cut out at both frames' keypoints: (1 - H_x) and (1 - H_y). You forget H_y.",
+    "(1 - h_x) * (1 - h_y) * phi_x",
+    "(1 - h_x) * phi_x",
+)
+transport.mistake(
+    "The source is cut out at both frames' keypoints: (1 - H_x) and (1 - H_y). You forget H_x.",
+    "(1 - h_x) * (1 - h_y) * phi_x",
+    "(1 - h_y) * phi_x",
+)
+transport.mistake(
+    "What is pasted comes from y, at y's keypoints; yours comes from x.", "h_y * phi_y", "h_y * phi_x"
+)
+transport.mistake("What is pasted stands at y's keypoints, not at x's.", "+ h_y * phi_y", "+ h_x * phi_y")
+
+
+@exercise("5.4", "The loss (Eq. 7), weighted")
+def loss(y_hat, y, median):
+    weight = 1 + 10 * (y - median).abs().mean(1, keepdim=True)
+    return (weight * (y_hat - y) ** 2).mean()
+
+
+def _images(rng):
+    return _tensor(rng, 2, 3, 8, 8), _tensor(rng, 2, 3, 8, 8), _tensor(rng, 1, 3, 8, 8)
+
+
+loss.check("images anywhere", _images, points=2)
+loss.check("a perfect picture costs nothing", lambda rng: ((y := _images(rng))[1], y[1].clone(), y[2]))
+loss.check(
+    "a frame that is the median: every pixel counts once",
+    lambda rng: ((y := _images(rng))[0], y[2], y[2].clone()),
+)
+loss.mistake(
+    "The weight is one number a pixel: the mean over the three colours, with the channel's dimension kept.",
+    ".mean(1, keepdim=True)",
+    "",
+)
+loss.mistake(
+    "Every pixel counts at least once: the weight is 1 + 10 times the difference.", "1 + 10 *", "10 *"
+)
+loss.mistake(
+    "Squared differences: a missing object costs more than a blurred edge.",
+    "(y_hat - y) ** 2",
+    "(y_hat - y).abs()",
+)
+loss.mistake(
+    "The weight marks what moves in the true frame y, not in your own reconstruction.",
+    "(y - median)",
+    "(y_hat - median)",
+)
+
+
+@exercise("5.5", "Does it follow the truth?")
+def r2(z, truth):
+    half = len(z) // 2
+    A = np.concatenate([z.reshape(len(z), -1), np.ones((len(z), 1))], 1)
+    W = np.linalg.lstsq(A[:half], truth[:half], rcond=None)[0]
+    held = truth[half:]
+    return 1 - ((A[half:] @ W - held) ** 2).sum() / ((held - held.mean()) ** 2).sum()
+
+
+def _follows(rng, noise=0.02):
+    z = rng.normal(size=(80, 3, 2))
+    return z, 40 + z.reshape(80, -1) @ rng.normal(0, 5, 6) + rng.normal(0, 50 * noise, 80)
+
+
+r2.check("keypoints that follow, with jitter", _follows, atol=1e-3)
+r2.check("keypoints that follow exactly", lambda rng: _follows(rng, 0), atol=1e-3)
+r2.check(
+    "keypoints that know nothing", lambda rng: (rng.normal(size=(60, 2, 2)), rng.normal(size=60)), atol=1e-3
+)
+r2.mistake(
+    "You judge on the frames you fitted: five keypoints that know nothing still fit a little. Fit on the first "
+    "half, judge on the second.",
+    "held = truth[half:]",
+    "held, half = truth, 0",
+)
+r2.mistake(
+    "The map needs a constant: append a column of ones.", "np.ones((len(z), 1))", "np.zeros((len(z), 1))"
+)
+r2.mistake("R^2 is 1 minus the share of the variance that is left.", "return 1 - (", "return (")
+r2.mistake(
+    "Compare with the spread about the mean of the held-out truth, not about 0.",
+    "(held - held.mean())",
+    "held",
+)
