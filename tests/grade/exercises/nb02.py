@@ -1,0 +1,353 @@
+"""Notebook 2, soft actor-critic: tanh-Gaussian, critics' target and slow copies, temperature, actor."""
+
+import math
+
+import numpy as np
+import torch
+import torch.nn.functional as F
+
+from tests.grade.exercise import exercise
+
+
+def _normal(rng, *shape, scale=1.0):
+    return torch.from_numpy(rng.normal(0, scale, shape).astype(np.float32))
+
+
+def _uniform(rng, low, high, *shape):
+    return torch.from_numpy(np.asarray(rng.uniform(low, high, shape), np.float32))
+
+
+@exercise("2.1", "The log-density of a squashed Gaussian")
+def squash(mean, log_std, noise):
+    u = mean + log_std.exp() * noise
+    log_normal = -log_std - 0.5 * noise**2 - 0.5 * math.log(2 * math.pi)
+    log_slope = 2 * (math.log(2) - u - F.softplus(-2 * u))
+    return torch.tanh(u), (log_normal - log_slope).sum(-1)
+
+
+def _moderate(rng):
+    return _uniform(rng, -1, 1, 6, 3), _uniform(rng, -2, -0.5, 6, 3), _uniform(rng, -1, 1, 6, 3)
+
+
+def _one_action(rng):
+    """One Gaussian, its noise on a grid: the actions run from one bound to the other."""
+    mean, log_std = _uniform(rng, -0.6, 0.6, 1, 1), _uniform(rng, -1.5, -0.3, 1, 1)
+    return mean.repeat(600, 1), log_std.repeat(600, 1), torch.linspace(-5, 5, 600)[:, None].clone()
+
+
+def _adds_up_to_one(got, args):
+    if not isinstance(got, list | tuple) or len(got) != 2:
+        return "it should return two tensors: the actions and their log-densities"
+    a, log_pi = (np.asarray(x) for x in got)
+    if a.shape != (600, 1) or log_pi.shape != (600,):
+        return f"its shapes are {a.shape} and {log_pi.shape}; expected (600, 1) and (600,)"
+    if a.dtype.kind != "f" or log_pi.dtype.kind != "f":
+        return "it should return floating-point numbers"
+    density = np.exp(np.minimum(log_pi.astype(float), 50))
+    area = float((np.diff(a[:, 0]) * (density[1:] + density[:-1]) / 2).sum())
+    return None if abs(area - 1) < 0.01 else f"the density over all actions adds up to {area:.3f}; expected 1"
+
+
+def _far_out(rng):
+    side = torch.from_numpy(rng.choice([-1, 1], (8, 3)).astype(np.float32))
+    return side * _uniform(rng, 10, 25, 8, 3), _uniform(rng, -2, 0, 8, 3), _normal(rng, 8, 3)
+
+
+squash.check("actions and log-densities near the middle", _moderate, atol=1e-3)
+squash.check("the density over all actions adds up to 1", _one_action, atol=1e-3, verify=_adds_up_to_one)
+squash.check("far out, where tanh is flat, it stays finite and right", _far_out, points=2)
+squash.mistake(
+    "This is the density of u, before the tanh. The tanh squeezes the axis: which term says by how much?",
+    "(log_normal - log_slope)",
+    "log_normal",
+)
+squash.mistake(
+    "Your correction has the wrong sign: where the tanh is flat, many u share a short stretch of a, and the "
+    "density of a is higher there than that of u.",
+    "log_normal - log_slope",
+    "log_normal + log_slope",
+)
+squash.mistake(
+    "Right near the middle, infinite far out: in float32 tanh(10) is exactly 1, and you "
+    "take the log of 0. Use the form with softplus.",
+    "2 * (math.log(2) - u - F.softplus(-2 * u))",
+    "torch.log(1 - torch.tanh(u) ** 2)",
+)
+squash.mistake(
+    "A small constant inside the log keeps it finite, but wrong far out, where the slope is smaller than "
+    "that constant. The form with softplus needs none.",
+    "2 * (math.log(2) - u - F.softplus(-2 * u))",
+    "torch.log(1 - torch.tanh(u) ** 2 + 1e-6)",
+)
+squash.mistake(
+    "A wider Gaussian is a lower one: your log-density of u does not depend on the standard deviation.",
+    "-log_std - 0.5",
+    "-0.5",
+)
+squash.mistake(
+    "The numbers of an action are independent: densities multiply, so logs add up. You average them.",
+    ".sum(-1)",
+    ".mean(-1)",
+)
+squash.mistake(
+    "One log-density an action, shape (B,), not one for each of its numbers: add up over the last dimension.",
+    ".sum(-1)",
+    "",
+)
+
+
+@exercise("2.2", "The critics' target")
+def critic_target(reward, terminal, truncated, q1, q2, log_pi, alpha, gamma):
+    value = torch.minimum(q1, q2) - alpha * log_pi
+    return reward + gamma * (1 - terminal) * value
+
+
+def _transitions(rng, ended=None, n=8):
+    flags = {"terminal": torch.zeros(n), "truncated": torch.zeros(n)}
+    if ended:
+        flags[ended] = torch.from_numpy((rng.permutation(n) < 3).astype(np.float32))
+    reward, q1, q2, log_pi = (_normal(rng, n, scale=k) for k in (1, 5, 5, 2))
+    alpha, gamma = float(rng.uniform(0.1, 0.8)), float(rng.uniform(0.8, 0.99))
+    return reward, flags["terminal"], flags["truncated"], q1, q2, log_pi, alpha, gamma
+
+
+critic_target.check("in the middle of an episode", _transitions, points=2)
+critic_target.check("nothing comes after a terminal step", lambda rng: _transitions(rng, "terminal"))
+critic_target.check("the time limit is not an end", lambda rng: _transitions(rng, "truncated"))
+critic_target.mistake(
+    "You believe the larger of the two critics; the smaller one guards against errors upwards.",
+    "torch.minimum",
+    "torch.maximum",
+)
+critic_target.mistake(
+    "You average the two critics: an error upwards of one still gets in. Take the smaller, number by number.",
+    "torch.minimum(q1, q2)",
+    "0.5 * (q1 + q2)",
+)
+critic_target.mistake(
+    "The soft value of Eq. 3 has an entropy term, and yours has none: alpha and log_pi are unused.",
+    "torch.minimum(q1, q2) - alpha * log_pi",
+    "torch.minimum(q1, q2)",
+)
+critic_target.mistake(
+    "A rare action, log_pi very negative, should be worth more; in your target it is worth less.",
+    "- alpha * log_pi",
+    "+ alpha * log_pi",
+)
+critic_target.mistake(
+    "You cut the future off at the time limit: the clock stopped the episode, but the state goes on.",
+    "(1 - terminal)",
+    "(1 - terminal) * (1 - truncated)",
+)
+critic_target.mistake(
+    "You do not look at terminal: after the end there is neither value nor entropy.",
+    "(1 - terminal)",
+    "1",
+)
+critic_target.mistake(
+    "The next action's entropy lies in the future too: it belongs inside what is discounted and cut off.",
+    "value = torch.minimum(q1, q2) - alpha * log_pi\n    return reward + gamma * (1 - terminal) * value",
+    "return reward - alpha * log_pi + gamma * (1 - terminal) * torch.minimum(q1, q2)",
+)
+
+
+@exercise(
+    "2.3",
+    "Slow copies of the critics",
+    probe="""
+    def probe(slow, fast, tau, times, ask):
+        nets = []
+        for weight, bias in (slow, fast):
+            net = nn.Sequential(nn.Linear(*weight.shape[::-1]))
+            net.load_state_dict({"0.weight": weight, "0.bias": bias})
+            nets.append(net)
+        target, online = nets[0].requires_grad_(False), nets[1]
+        for _ in range(times):
+            follow(target, online, tau)
+        if ask == "gradient":
+            return [target[0].weight.requires_grad, target[0].bias.requires_grad]
+        net = {"target": target, "online": online}[ask][0]
+        return [net.weight.detach(), net.bias.detach()]
+    """,
+)
+def follow(target, online, tau):
+    with torch.no_grad():
+        for slow, fast in zip(target.parameters(), online.parameters(), strict=True):
+            slow.copy_((1 - tau) * slow + tau * fast)
+
+
+def _two_nets(rng, times, ask):
+    slow, fast = ([_normal(rng, 2, 3), _normal(rng, 2)] for _ in range(2))
+    return slow, fast, float(rng.uniform(0.05, 0.3)), times, ask
+
+
+follow.check("one step moves weights and biases", lambda rng: _two_nets(rng, 1, "target"))
+follow.check("five steps in a row", lambda rng: _two_nets(rng, 5, "target"))
+follow.check("the online network stays as it is", lambda rng: _two_nets(rng, 3, "online"))
+follow.check("the copy stays out of the gradient", lambda rng: _two_nets(rng, 2, "gradient"))
+follow.mistake(
+    "Your copy jumps most of the way: tau is the small share that comes from the online network.",
+    "(1 - tau) * slow + tau * fast",
+    "tau * slow + (1 - tau) * fast",
+)
+follow.mistake(
+    "Your copy equals the online network after one step: tau is not used.",
+    "(1 - tau) * slow + tau * fast",
+    "fast",
+)
+follow.mistake(
+    "You add a share of the online weights but keep all of the old ones: the two shares have to sum to 1.",
+    "(1 - tau) * slow + tau * fast",
+    "slow + tau * fast",
+)
+follow.mistake(
+    "You move the online network towards the copy: the online one is the optimizer's alone.",
+    "slow.copy_((1 - tau) * slow + tau * fast)",
+    "fast.copy_((1 - tau) * fast + tau * slow)",
+)
+follow.mistake(
+    "Only part of the copy moves: go through all parameters, weights and biases.",
+    "in zip(target.parameters(), online.parameters(), strict=True)",
+    "in list(zip(target.parameters(), online.parameters(), strict=True))[:1]",
+)
+follow.mistake(
+    "Autograd records your averaging, so the copy drags an ever longer graph along: switch it off.",
+    "with torch.no_grad()",
+    "if True",
+)
+
+
+@exercise(
+    "2.4",
+    "The temperature's loss (Eq. 18)",
+    probe="""
+    def probe(log_alpha, log_pi, target_entropy, ask):
+        log_alpha, log_pi = log_alpha.clone().requires_grad_(), log_pi.clone().requires_grad_()
+        loss = temperature_loss(log_alpha, log_pi, target_entropy)
+        if ask == "loss":
+            return loss.detach()
+        if loss.requires_grad:
+            loss.sum().backward()
+        leaf = log_alpha if ask == "alpha" else log_pi
+        gradient = torch.zeros_like(leaf) if leaf.grad is None else leaf.grad
+        return (leaf.detach() - 0.1 * gradient).exp() if ask == "alpha" else gradient
+    """,
+)
+def temperature_loss(log_alpha, log_pi, target_entropy):
+    alpha = log_alpha.exp()
+    return -(alpha * (log_pi.detach() + target_entropy)).mean()
+
+
+def _temperature(rng, ask, entropy=0.0):
+    """A batch whose entropy lies that far above its target."""
+    target = float(rng.uniform(-6, -1))
+    log_pi = _normal(rng, 32) - target - entropy
+    return _uniform(rng, -3, -0.5), log_pi, target, ask
+
+
+temperature_loss.check("the value of the loss", lambda rng: _temperature(rng, "loss", rng.choice([-2, 2])))
+temperature_loss.check(
+    "entropy below its target: a step downhill raises alpha", lambda rng: _temperature(rng, "alpha", -2)
+)
+temperature_loss.check(
+    "entropy above its target: a step downhill lowers alpha", lambda rng: _temperature(rng, "alpha", 2)
+)
+temperature_loss.check("no gradient reaches the policy", lambda rng: _temperature(rng, "policy", -2))
+temperature_loss.mistake(
+    "With your sign alpha falls when the policy has too little entropy, and the policy freezes.",
+    "-(alpha",
+    "(alpha",
+)
+temperature_loss.mistake(
+    "The entropy is -E[log pi], so it has reached its target where log_pi + target_entropy is 0 on average; "
+    "yours is 0 elsewhere.",
+    "log_pi.detach() + target_entropy",
+    "log_pi.detach() - target_entropy",
+)
+temperature_loss.mistake(
+    "Eq. 18 multiplies by alpha; you multiply by its logarithm.",
+    "log_alpha.exp()",
+    "log_alpha",
+)
+temperature_loss.mistake(
+    "The value is right, but the gradient also runs into log_pi and changes the policy: stop it there.",
+    "log_pi.detach()",
+    "log_pi",
+)
+temperature_loss.mistake(
+    "The loss's value is right, but no gradient reaches log_alpha: alpha would never change.",
+    "log_alpha.exp()",
+    "log_alpha.exp().detach()",
+)
+temperature_loss.mistake(
+    "Eq. 18 is an expectation: the mean over the batch, not its sum.", ".mean()", ".sum()"
+)
+
+
+@exercise(
+    "2.5",
+    "The actor's loss (Eq. 7)",
+    given=(squash,),
+    probe="""
+    def probe(weight, peaks, s, noise, log_alpha, ask):
+        weight, log_alpha = weight.clone().requires_grad_(), log_alpha.clone().requires_grad_()
+        actor = lambda s: (s @ weight).chunk(2, -1)
+        critics = lambda s, a: -3 * ((a - torch.tanh(s @ peaks)) ** 2).sum(-1)
+        loss = actor_loss(actor, critics, s, noise, log_alpha)
+        if ask == "loss":
+            return loss.detach()
+        if loss.requires_grad:
+            loss.sum().backward()
+        leaf = weight if ask == "actor" else log_alpha
+        return torch.zeros_like(leaf) if leaf.grad is None else leaf.grad
+    """,
+)
+def actor_loss(actor, critics, s, noise, log_alpha):
+    mean, log_std = actor(s)
+    a, log_pi = squash(mean, log_std, noise)
+    q = critics(s, a).amin(0)
+    return (log_alpha.exp().detach() * log_pi - q).mean()
+
+
+def _policy(rng, ask):
+    """A linear actor of 4 numbers, two bowls as critics, a batch of 12."""
+    weight, peaks = _normal(rng, 4, 4, scale=0.4), _normal(rng, 2, 4, 2)
+    return weight, peaks, _normal(rng, 12, 4), _normal(rng, 12, 2), _uniform(rng, -2, -0.5), ask
+
+
+actor_loss.check("the value of the loss", lambda rng: _policy(rng, "loss"))
+actor_loss.check("the gradient that reaches the actor", lambda rng: _policy(rng, "actor"), points=2)
+actor_loss.check("no gradient reaches the temperature", lambda rng: _policy(rng, "alpha"))
+actor_loss.mistake(
+    "Your loss falls when the critics' values fall: the actor learns to do its worst. Mind Q's sign.",
+    "* log_pi - q",
+    "* log_pi + q",
+)
+actor_loss.mistake(
+    "You take the larger of the two critics' values: the actor would seek out where one errs upwards.",
+    "amin(0)",
+    "amax(0)",
+)
+actor_loss.mistake(
+    "Your loss has no entropy term: alpha and log_pi are unused.",
+    "(log_alpha.exp().detach() * log_pi - q)",
+    "(-q)",
+)
+actor_loss.mistake(
+    "The loss's value is right, but the critics' slope does not reach the actor: you cut the graph at a.",
+    "critics(s, a)",
+    "critics(s, a.detach())",
+)
+actor_loss.mistake(
+    "The loss's value is right, but its gradient also changes the temperature, which has a loss of its own.",
+    "log_alpha.exp().detach()",
+    "log_alpha.exp()",
+)
+actor_loss.mistake(
+    "Entropy is weighed by alpha; you weigh it by its logarithm.",
+    "log_alpha.exp().detach()",
+    "log_alpha.detach()",
+)
+actor_loss.mistake(
+    "Eq. 7 is an expectation: the mean over the batch, not its sum.", "- q).mean()", "- q).sum()"
+)

@@ -1,0 +1,216 @@
+"""Notebook 9, drawer: a joint with dry friction, and the whole method put together."""
+
+import numpy as np
+import pybullet as p
+
+from tests.grade.exercise import exercise
+
+
+@exercise(
+    "9.1",
+    "A drawer on its rail",
+    given=("import pybullet as p",),
+    probe="""
+    import pybullet as p
+
+    def probe(force, friction, seconds):
+        client = p.connect(p.DIRECT)
+        try:
+            p.setTimeStep(1 / 250, client)
+            body = make_drawer(client, friction)
+            q = []
+            for step in range(int(250 * seconds)):
+                if step % 25 == 0:
+                    q.append(p.getJointState(body, 0, client)[0])
+                p.applyExternalForce(body, 0, (force, 0, 0), (0, 0, 0), p.LINK_FRAME, client)
+                p.stepSimulation(client)
+            return np.array(q)
+        finally:
+            p.disconnect(client)
+    """,
+)
+def make_drawer(client, friction):
+    shape = p.createCollisionShape(p.GEOM_BOX, halfExtents=(0.05, 0.08, 0.04), physicsClientId=client)
+    body = p.createMultiBody(
+        baseMass=0, linkMasses=[0.8], linkCollisionShapeIndices=[shape], linkVisualShapeIndices=[-1],
+        linkPositions=[(0, 0, 0)], linkOrientations=[(0, 0, 0, 1)], linkInertialFramePositions=[(0, 0, 0)],
+        linkInertialFrameOrientations=[(0, 0, 0, 1)], linkParentIndices=[0],
+        linkJointTypes=[p.JOINT_PRISMATIC], linkJointAxis=[(1, 0, 0)], physicsClientId=client,
+    )  # fmt: skip
+    p.changeDynamics(
+        body,
+        0,
+        linearDamping=0,
+        jointDamping=0,
+        jointLowerLimit=-0.15,
+        jointUpperLimit=0,
+        physicsClientId=client,
+    )
+    p.setJointMotorControl2(
+        body, 0, p.VELOCITY_CONTROL, targetVelocity=0, force=friction, physicsClientId=client
+    )
+    p.resetJointState(body, 0, -0.15, physicsClientId=client)
+    return body
+
+
+make_drawer.check(
+    "a push below the friction does not move it",
+    lambda rng: (float(rng.uniform(5, 15)), 18.0, 0.5),
+    atol=1e-3,
+)
+make_drawer.check("a push above it does", lambda rng: (float(rng.uniform(19, 22)), 18.0, 0.3), atol=2e-3)
+make_drawer.check("it stops where it is shut", lambda rng: (40.0, 18.0, 1.0), atol=5e-3)
+make_drawer.mistake(
+    "It gives way to any push: dry friction is a velocity motor that wants 0 and has at most that force.",
+    "force=friction",
+    "force=0",
+)
+make_drawer.mistake(
+    "It slides along another axis than x: see linkJointAxis.",
+    "linkJointAxis=[(1, 0, 0)]",
+    "linkJointAxis=[(0, 1, 0)]",
+)
+make_drawer.mistake(
+    "It starts shut: reset the joint to -0.15, open.",
+    "resetJointState(body, 0, -0.15",
+    "resetJointState(body, 0, 0.0",
+)
+make_drawer.mistake(
+    "It slides on through the cabinet: set the joint's limits to -0.15 and 0.",
+    "jointLowerLimit=-0.15",
+    "jointLowerLimit=-9",
+    "jointUpperLimit=0",
+    "jointUpperLimit=9",
+)
+
+
+@exercise("9.2", "What the policy sees")
+def observe(z, z_before, target, clock):
+    return np.concatenate([z.ravel(), (z - z_before).ravel(), (target - z).ravel(), [clock]])
+
+
+def _seen(rng, K=5):
+    return *(rng.normal(size=(K, 2)) for _ in range(3)), float(rng.uniform())
+
+
+observe.check("five keypoints", _seen)
+observe.check("any number of them", lambda rng: _seen(rng, 3))
+observe.mistake(
+    "How the keypoints moved is z_t - z_{t-1}; yours has the opposite sign.",
+    "(z - z_before)",
+    "(z_before - z)",
+)
+observe.mistake(
+    "The way ahead leads from the robot to the demonstration: target minus z.", "(target - z)", "(z - target)"
+)
+observe.mistake(
+    "Give the way to the demonstration, not its place: or the policy has to learn the video by heart.",
+    "(target - z)",
+    "target",
+)
+observe.mistake("The clock is missing: the same z earns differently at different times.", ", [clock]", "")
+
+
+@exercise(
+    "9.3",
+    "The method, assembled",
+    probe="""
+    def probe(demo, robot):
+        calls = []
+
+        def translate(frames):
+            calls.append("translate")
+            return frames + 1000
+
+        def detect(frames):
+            calls.append("detect")
+            return 2 * frames
+
+        def make_reward(z_E, z_robot):
+            calls.append("make_reward")
+            return {"follows": z_E, "pace": z_robot}
+
+        def train(reward):
+            calls.append("train")
+            return {"policy for": reward}
+
+        policy = learn_by_watching(demo, robot, translate, detect, make_reward, train)
+        return {"policy": policy, "translations": calls.count("translate"), "trainings": calls.count("train")}
+    """,
+)
+def learn_by_watching(demo, robot, translate, detect, make_reward, train):
+    z_E = detect(translate(demo))
+    reward = make_reward(z_E, detect(robot))
+    return train(reward)
+
+
+learn_by_watching.check(
+    "the reward follows the translated video",
+    lambda rng: (rng.normal(size=(7, 2)), rng.normal(size=(9, 2))),
+    points=2,
+)
+learn_by_watching.check(
+    "videos of any length", lambda rng: (rng.normal(size=(3, 2)), rng.normal(size=(30, 2)))
+)
+learn_by_watching.mistake(
+    "You look for keypoints on the human's frames; the detector knows robots: translate first.",
+    "detect(translate(demo))",
+    "detect(demo)",
+)
+learn_by_watching.mistake(
+    "The robot's own frames need no translation.", "detect(robot)", "detect(translate(robot))"
+)
+learn_by_watching.mistake(
+    "make_reward takes the demonstration first, then the robot's keypoints.",
+    "make_reward(z_E, detect(robot))",
+    "make_reward(detect(robot), z_E)",
+)
+learn_by_watching.mistake(
+    "The pace is read from keypoints, too: detect them on the robot's frames.", "detect(robot)", "robot"
+)
+learn_by_watching.mistake("Return what `train` returns: the policy.", "return train(reward)", "return reward")
+
+
+@exercise(
+    "9.4",
+    "Testing it",
+    probe="""
+    def probe(outcomes):
+        def play(seed):
+            if not 1_000_000 <= seed < 1_000_000 + len(outcomes):
+                raise ValueError(f"{seed} is no test seed")
+            return [bool(x) for x in outcomes[int(seed) - 1_000_000]]
+
+        return evaluate(play, len(outcomes))
+    """,
+)
+def evaluate(play, n):
+    return sum(any(play(1_000_000 + i)) for i in range(n))
+
+
+def _episodes(rng, n=10):
+    return (rng.random((n, 12)) < 0.08,)
+
+
+evaluate.check("ten episodes", _episodes)
+evaluate.check("forty episodes", lambda rng: _episodes(rng, 40))
+evaluate.check(
+    "done at the last step alone",
+    lambda rng: (np.pad(np.zeros((6, 11), bool), ((0, 0), (0, 1)), constant_values=True),),
+)
+evaluate.mistake(
+    "Success counts at any step within the horizon; you ask for the last one.",
+    "any(play(1_000_000 + i))",
+    "play(1_000_000 + i)[-1]",
+)
+evaluate.mistake(
+    "You count steps; an episode that succeeds counts once.",
+    "any(play(1_000_000 + i))",
+    "sum(play(1_000_000 + i))",
+)
+evaluate.mistake(
+    "Those seeds belong to the training; test episodes start at 1,000,000.", "1_000_000 + i", "i"
+)
+evaluate.mistake(
+    "You play one episode again and again: each needs a seed of its own.", "1_000_000 + i", "1_000_000"
+)
