@@ -81,7 +81,7 @@ heat_map.check(
     "two on one spot: no value above 1", lambda rng: (_points(rng, 1).expand(3, 4, 2).clone(), 0.3, 15)
 )
 heat_map.mistake(
-    "Your maps sum past 1 where keypoints meet: Eq. 6 wants one H per image, the chance that any covers a cell.",
+    "Your maps sum past 1 where keypoints overlap: Eq. 6 wants one H per image, never above 1.",
     "1 - (1 - h).prod(1, keepdim=True)",
     "h.sum(1, keepdim=True)",
 )
@@ -195,7 +195,7 @@ r2.check(
     "keypoints that know nothing", lambda rng: (rng.normal(size=(60, 2, 2)), rng.normal(size=60)), atol=1e-3
 )
 r2.mistake(
-    "You judge on the frames you fitted: five keypoints that know nothing still fit a little. Fit on the first "
+    "You judge on the frames you fitted: keypoints that know nothing still fit a little. Fit on the first "
     "half, judge on the second.",
     "held = truth[half:]",
     "held, half = truth, 0",

@@ -1,0 +1,126 @@
+"""Notebook 8, coffee: clutter, and what translation does about it."""
+
+import numpy as np
+
+from tests.grade.exercise import exercise
+
+
+def _video(rng, T=9, H=10, W=12):
+    """Mostly a still picture, with something that moves across it."""
+    frames = np.repeat(rng.integers(30, 220, (1, H, W, 3)), T, axis=0)
+    for t in range(T):
+        frames[t, 2:6, t : t + 3] = rng.integers(0, 256, 3)
+    return (frames + rng.integers(-2, 3, frames.shape)).clip(0, 255).astype(np.uint8)
+
+
+@exercise("8.2", "What stands out from the median")
+def foreground(video, threshold):
+    video = video.astype(float)
+    return np.abs(video - np.median(video, axis=0)).mean(-1) > threshold
+
+
+foreground.check("something crosses a still picture", lambda rng: (_video(rng), 20.0))
+foreground.check("another threshold", lambda rng: (_video(rng), float(rng.uniform(5, 60))))
+foreground.check("darker than the background counts as well", lambda rng: (255 - _video(rng) // 2, 15.0))
+foreground.mistake(
+    "uint8 has no negative numbers: 10 - 20 is 246. Turn the video into floats first.",
+    "video.astype(float)",
+    "video.copy()",
+    "np.median(video, axis=0)",
+    "np.median(video, axis=0).astype(np.uint8)",
+)
+foreground.mistake(
+    "The median goes over time, axis 0: one picture for the whole video.",
+    "np.median(video, axis=0)",
+    "np.median(video, axis=-1, keepdims=True)",
+)
+foreground.mistake(
+    "Take the median: the mean is smeared by everything that passes.", "np.median(video", "np.mean(video"
+)
+foreground.mistake(
+    "What is darker than the background stands out, too: take the absolute difference.", "np.abs(", "("
+)
+foreground.mistake("One truth value a pixel: take the mean over the three colours first.", ".mean(-1)", "")
+
+
+@exercise("8.3", "Where the motion is")
+def share_inside(video, mask):
+    energy = (np.diff(video.astype(float), axis=0) ** 2).sum((0, 3))
+    return energy[mask].sum() / energy.sum()
+
+
+def _masked(rng):
+    video, mask = _video(rng), np.zeros((10, 12), bool)
+    mask[rng.integers(4) :, : rng.integers(4, 10)] = True
+    return video, mask
+
+
+share_inside.check("any region", _masked, points=2)
+share_inside.check("the whole picture holds all of it", lambda rng: (_video(rng), np.ones((10, 12), bool)))
+share_inside.mistake(
+    "uint8 has no negative numbers: a pixel that gets darker by 1 counts as 255. Use floats.",
+    "video.astype(float)",
+    "video",
+    ") ** 2)",
+    ").astype(float) ** 2)",
+)
+share_inside.mistake(
+    "Motion is a difference between frames; you add up the frames themselves.",
+    "np.diff(video.astype(float), axis=0)",
+    "video.astype(float)",
+)
+share_inside.mistake("That is the share outside: the mask is True inside.", "energy[mask]", "energy[~mask]")
+share_inside.mistake(
+    "Divide by all the motion, not by the number of pixels.", "/ energy.sum()", "/ energy.size"
+)
+share_inside.mistake("Energy is the square of the difference.", ") ** 2)", "))")
+
+
+@exercise("8.1", "Slide or tip")
+def highest_push(radius, mu):
+    return radius / mu
+
+
+highest_push.check("any mug", lambda rng: (float(rng.uniform(0.02, 0.05)), float(rng.uniform(0.1, 1))))
+highest_push.check(
+    "a smooth table lets you push anywhere", lambda rng: (0.03, float(rng.uniform(0.01, 0.05)))
+)
+highest_push.mistake("A rougher table makes it tip sooner: divide by mu.", "radius / mu", "radius * mu")
+highest_push.mistake(
+    "It turns about the edge of its foot, one radius from the middle, not two.",
+    "radius / mu",
+    "2 * radius / mu",
+)
+highest_push.mistake(
+    "The weight acts in the middle, a whole radius from the edge, not half of one.",
+    "radius / mu",
+    "radius / (2 * mu)",
+)
+
+
+@exercise("8.4", "What the background does to a keypoint")
+def disturbance(z_a, z_b, size):
+    return np.linalg.norm(z_a - z_b, axis=-1).mean(0) * size / 2
+
+
+def _pair(rng):
+    z = rng.uniform(-1, 1, (12, 5, 2))
+    return z, z + rng.normal(0, 0.03, z.shape), 84
+
+
+disturbance.check("two videos that differ a little", _pair, points=2)
+disturbance.check("two equal ones", lambda rng: ((z := _pair(rng)[0]), z.copy(), 84))
+disturbance.mistake(
+    "From -1 to 1 are 2 units over `size` pixels: half of size for each.", "* size / 2", "* size"
+)
+disturbance.mistake("One number a keypoint: the mean goes over frames only.", ".mean(0)", ".mean()")
+disturbance.mistake(
+    "A shift to the left and one to the right do not cancel: take each frame's distance first.",
+    "np.linalg.norm(z_a - z_b, axis=-1).mean(0)",
+    "np.linalg.norm((z_a - z_b).mean(0), axis=-1)",
+)
+disturbance.mistake(
+    "x and y belong together: the distance is the norm over both.",
+    "np.linalg.norm(z_a - z_b, axis=-1)",
+    "np.abs(z_a - z_b).sum(-1)",
+)
