@@ -1,6 +1,9 @@
 """An instructor who has nbgrader releases and grades the notebooks with it, unchanged."""
 
+import os
 import shutil
+import sys
+from pathlib import Path
 
 import nbformat
 import pytest
@@ -21,6 +24,8 @@ def scores(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PYTHONPATH", str(ROOT))
         patch.setenv("LBW_FAST", "1")
+        # nbgrader calls alembic, which an activated environment would find.
+        patch.setenv("PATH", f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
         patch.setenv("HOME", str(course))
         patch.chdir(course)
         config = Config()
