@@ -13,7 +13,6 @@ import hashlib
 import io
 import json
 import re
-import shutil
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict
@@ -43,8 +42,8 @@ def main(argv=None) -> int:
     if not args.folder.exists():
         print(f"{args.folder}: no such folder", file=sys.stderr)
         return 2
-    if not shutil.which("bwrap"):
-        print(f"warning: {sandbox.WARNING}", file=sys.stderr)
+    if lacks := sandbox.warning():
+        print(f"warning: {lacks}", file=sys.stderr)
     torch.set_num_threads(1)
     single = args.folder.suffix == ".ipynb" or (any(args.folder.glob("*.ipynb")) and _is_one(args.folder))
     entries = [args.folder] if single else sorted(p for p in args.folder.iterdir() if not hidden(p))

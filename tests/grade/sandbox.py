@@ -1,8 +1,8 @@
 """A place for a student's code: a process that cannot read, write, send or stay.
 
-With bubblewrap (`bwrap`) it sees the Python installation and nothing else of the disk, and no network.
-Without it, limits and a system-call filter remain (see `cell/worker.py`), but files can be read: `WARNING`
-says so.
+Two walls: bubblewrap (`bwrap`), where it is installed, shows it the Python installation and nothing else of the
+disk, no other process, no network. Inside, the process gives up files, calls and resources itself (Landlock,
+seccomp, limits, see `cell/worker.py`). `warning` says what is missing on this machine.
 """
 
 from __future__ import annotations
@@ -20,12 +20,11 @@ import time
 from pathlib import Path
 
 from tests.grade.cell import wire
+from tests.grade.cell.worker import has_landlock
 
 CELL = Path(__file__).resolve().parent / "cell"
-WARNING = (
-    "bubblewrap is not installed: the code of submissions cannot write, fork or reach the network, but it "
-    "can read the files of this machine. Install it (Debian: apt install bubblewrap) before you grade."
-)
+SYSTEM = ("/usr", "/lib", "/lib64", "/bin", "/etc/ld.so.cache", "/etc/alternatives")
+DEVICES = ("/dev/null", "/dev/zero", "/dev/random", "/dev/urandom")
 MEMORY = 2 << 30  # bytes a student's code may take
 CPU = 10  # s of processor time for one exercise
 WALL = 15  # s for one call, asleep or not
@@ -37,16 +36,26 @@ class Lost(Exception):
     """The student's process is gone, or had to go; the message says why, to the student."""
 
 
+def warning() -> str:
+    """What the sandbox lacks on this machine, one sentence to the lecturer; empty if nothing."""
+    if shutil.which("bwrap"):
+        return ""
+    files = "the kernel alone (Landlock) keeps this machine's files from the code of submissions"
+    if not has_landlock():
+        files = "the code of submissions can READ THE FILES of this machine, solutions included"
+    return f"bubblewrap is not installed: {files}. Install it (Debian: apt install bubblewrap) before you grade."
+
+
 def command(fd: int) -> list[str]:
     """How to start the worker: inside bubblewrap where there is one."""
-    python = [sys.executable, "-I", "-B", str(CELL / "worker.py"), str(fd)]
+    homes = {Path(p).resolve() for p in (sys.prefix, sys.base_prefix)} | {Path(sys.prefix), CELL}
+    homes = sorted(map(str, homes))
+    python = [sys.executable, "-I", "-B", str(CELL / "worker.py"), str(fd), *SYSTEM, *DEVICES, *homes]
     bwrap = shutil.which("bwrap")
     if not bwrap:
         return python
-    seen = ("/usr", "/lib", "/lib64", "/bin", "/etc/ld.so.cache", "/etc/alternatives")
-    homes = {Path(p).resolve() for p in (sys.prefix, sys.base_prefix)} | {Path(sys.prefix), CELL}
-    binds = [x for path in seen for x in ("--ro-bind-try", path, path)]
-    binds += [x for path in sorted(map(str, homes)) for x in ("--ro-bind", path, path)]
+    binds = [x for path in SYSTEM for x in ("--ro-bind-try", path, path)]
+    binds += [x for path in homes for x in ("--ro-bind", path, path)]
     return [
         bwrap, "--unshare-all", "--die-with-parent", "--new-session", "--clearenv", "--cap-drop", "ALL",
         "--size", str(8 << 20), "--tmpfs", "/tmp", *binds, "--proc", "/proc", "--dev", "/dev", "--setenv",

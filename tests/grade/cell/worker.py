@@ -1,9 +1,10 @@
 """The process where a student's code runs: it gets source and inputs, and returns values. It judges nothing.
 
-Started as `python -I worker.py FD`, best inside bubblewrap. It imports the slow libraries once, and forks for
-every exercise; the fork confines itself before it runs a line of the student's.
+Started as `python -I worker.py FD READABLE...`, best inside bubblewrap. It imports the slow libraries once, and
+forks for every exercise; the fork confines itself before it runs a line of the student's.
 """
 
+import contextlib
 import ctypes
 import io
 import os
@@ -34,8 +35,8 @@ class Hidden:
             raise ImportError(f"{name} is not here: an exercise is answered by your own lines")
 
 
-def confine(memory: int, cpu: int) -> None:
-    """Limit this process for good. memory: bytes beyond what it has now; cpu: seconds."""
+def confine(memory: int, cpu: int, readable: list[str]) -> None:
+    """Limit this process for good. memory: bytes beyond what it has now; cpu: seconds; readable: paths."""
     with open("/proc/self/statm") as f:
         size = int(f.read().split()[0]) * os.sysconf("SC_PAGE_SIZE")
     limits = {
@@ -47,7 +48,51 @@ def confine(memory: int, cpu: int) -> None:
     }
     for what, most in limits.items():
         resource.setrlimit(what, (most, most))
+    _prctl(38, 1)  # PR_SET_NO_NEW_PRIVS: what both walls below ask for first
+    if has_landlock():
+        close_files(readable)
     filter_calls()
+
+
+def _call(number: int, *args) -> int:
+    """A system call that libc has no name for. Raises OSError."""
+    libc = ctypes.CDLL(None, use_errno=True)
+    result = libc.syscall(ctypes.c_long(number), *args)
+    if result < 0:
+        raise OSError(ctypes.get_errno(), os.strerror(ctypes.get_errno()))
+    return result
+
+
+def _prctl(option: int, *args) -> None:
+    libc = ctypes.CDLL(None, use_errno=True)
+    if libc.prctl(option, *args, *[0] * (4 - len(args))):
+        raise OSError(ctypes.get_errno(), os.strerror(ctypes.get_errno()))
+
+
+CREATE_RULESET, ADD_RULE, RESTRICT_SELF = 444, 445, 446
+EVERY_ACCESS = (1 << 13) - 1  # to files, in Landlock's first version: execute, write, read, list, remove, make
+READ_FILE, READ_DIR = 1 << 2, 1 << 3
+
+
+def has_landlock() -> bool:
+    """Whether this kernel has Landlock, which keeps files from a process (Linux 5.13, where switched on)."""
+    with contextlib.suppress(OSError):
+        return _call(CREATE_RULESET, None, ctypes.c_size_t(0), 1) >= 1
+    return False
+
+
+def close_files(readable: list[str]) -> None:
+    """No file can be opened any more but those at or below the `readable` paths, to be read: Landlock."""
+    handled = ctypes.c_uint64(EVERY_ACCESS)
+    rules = _call(CREATE_RULESET, ctypes.byref(handled), ctypes.c_size_t(8), 0)
+    for path in filter(os.path.exists, readable):
+        place = os.open(path, os.O_PATH | os.O_CLOEXEC)
+        access = READ_FILE | (READ_DIR if os.path.isdir(path) else 0)
+        rule = ctypes.create_string_buffer(struct.pack("=Qi", access, place), 12)
+        _call(ADD_RULE, rules, 1, rule, 0)  # 1: what lies beneath a path
+        os.close(place)
+    _call(RESTRICT_SELF, rules, 0)
+    os.close(rules)
 
 
 # A classic BPF program over struct seccomp_data: number at 0, architecture at 4, arguments at 16 + 8 i.
@@ -100,10 +145,7 @@ def filter_calls() -> None:
     code = b"".join(struct.pack("<HBBI", *line) for line in program)
     buffer = ctypes.create_string_buffer(code, len(code))
     header = struct.pack("@HP", len(program), ctypes.addressof(buffer))
-    libc = ctypes.CDLL(None, use_errno=True)
-    no_new_privileges, set_seccomp, filter_mode = 38, 22, 2
-    if libc.prctl(no_new_privileges, 1, 0, 0, 0) or libc.prctl(set_seccomp, filter_mode, header, 0, 0):
-        raise OSError(ctypes.get_errno(), "the kernel takes no seccomp filter")
+    _prctl(22, 2, header)  # PR_SET_SECCOMP, SECCOMP_MODE_FILTER
 
 
 def run(job: dict, answer) -> None:
@@ -145,8 +187,8 @@ class Answer:
         return data or None
 
 
-def main(fd: int) -> None:
-    """Serve exercises until the judge hangs up."""
+def main(fd: int, readable: list[str]) -> None:
+    """Serve exercises until the judge hangs up. readable: the paths that a student's code may read."""
     channel = socket.socket(fileno=fd)
     space = {}
     exec(PREAMBLE, space)
@@ -166,7 +208,7 @@ def main(fd: int) -> None:
             try:
                 os.chdir("/")
                 sys.stdin = io.StringIO()
-                confine(job["memory"], job["cpu"])
+                confine(job["memory"], job["cpu"], readable)
             except BaseException as e:  # never run a stranger's code unconfined
                 Answer(channel, job["number"])(f"unconfined: {e}")
                 os._exit(1)
@@ -179,4 +221,4 @@ def main(fd: int) -> None:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]))
+    main(int(sys.argv[1]), sys.argv[2:])
