@@ -1,12 +1,21 @@
 """The exercises themselves: references earn everything, and every anticipated mistake gets its own hint."""
 
+import numpy as np
 import pytest
 
-from tests.grade.cell.wire import decode, encode
+from tests.grade.cell.wire import Garbage, Other, Raised, decode, encode
 from tests.grade.exercise import everything
 from tests.grade.judge import judge
 
 ALL = everything()
+NONSENSE = [
+    None, True, 0, -1, 1 << 62, 1 << 150, 1.5, float("nan"), float("inf"), "", "fair", b"x", [], [1], [[1]],
+    (), {}, (1, 2), (1, 2, 3), ((),), ({},), {"a": 1}, {(1, 2): 3}, (None,) * 3, (1 << 150,) * 2, [0, "a"],
+    ["a", "b"], (True, False), (0.0,) * 5, np.zeros(0), np.zeros(()), np.zeros((1, 1, 1)), np.float32(3),
+    np.zeros(3, complex), np.full(3, np.nan), np.zeros(3, bool), np.zeros(3, int), np.bool_(True),
+    np.zeros((2, 0, 3)), np.array(["a"]), (np.zeros(3), np.zeros(3)), [np.zeros(2), "a"], {"x": np.zeros(2)},
+    Raised("KeyError", "x"), Other("set"),
+]  # fmt: skip
 MISTAKES = [(e, m) for e in ALL.values() for m in e.mistakes]
 
 
@@ -41,8 +50,33 @@ def test_three_mistakes_are_anticipated_each_with_a_hint_of_its_own(exercise):
 
 @pytest.mark.parametrize("exercise", ALL.values(), ids=list(ALL))
 def test_inputs_pass_to_the_students_process_unchanged(exercise):
-    import numpy as np
-
     for check in exercise.checks:
         args = check.inputs(np.random.default_rng(0))
         assert encode(decode(encode(args))) is not None and b'"other"' not in encode(args)[:10_000]
+
+
+@pytest.mark.parametrize("exercise", ALL.values(), ids=list(ALL))
+def test_nonsense_earns_nothing_and_breaks_nothing(exercise):
+    said = 0
+
+    def say_something_else(args):
+        nonlocal said
+        said += 1
+        return decode(encode(NONSENSE[said % len(NONSENSE)])), False
+
+    while said < len(NONSENSE):
+        result = judge(exercise, say_something_else)
+        assert result.points == 0, result.lines()
+
+
+@pytest.mark.parametrize("value", [0.0, "fair"])
+@pytest.mark.parametrize("exercise", ALL.values(), ids=list(ALL))
+def test_an_answer_that_is_always_the_same_earns_nothing(exercise, value):
+    assert judge(exercise, lambda args: (value, False)).points == 0
+
+
+def test_ints_that_numpy_cannot_hold_do_not_pass():
+    assert decode(encode(1 << 62)) == 1 << 62
+    assert type(decode(encode(1 << 63))) is Other
+    with pytest.raises(Garbage):
+        decode(encode(1 << 62).replace(str(1 << 62).encode(), b"9" * 19))

@@ -13,8 +13,10 @@ import time
 from pathlib import Path
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
 
+import tests.grade.__main__ as grading
 from tests.grade import sandbox
 from tests.grade.__main__ import main, safe
 from tests.grade.cell.worker import has_landlock
@@ -108,6 +110,20 @@ BAD = {
     ),
 }  # fmt: skip
 
+
+def learnt_by_heart(exercise):
+    """An answer that has the inputs of the students' own check and their results in a table."""
+    reference, table = exercise.run(exercise.source), {}
+    for i, check in enumerate(exercise.checks):
+        rng = np.random.default_rng([0, i])
+        for _ in range(check.trials):
+            args = check.inputs(rng)
+            table[b"".join(x.tobytes() for x in args)] = float(reference(args))
+    lookup = "[z.tobytes() + z_E.tobytes()]"
+    return f"TABLE = {table!r}\ndef r1(z, z_E):\n    return TABLE{lookup}"
+
+
+BAD["learnt by heart"] = (learnt_by_heart(E61), 0)
 READERS = [name for name in BAD if name.startswith("reads ")]
 CLOSED = shutil.which("bwrap") or has_landlock()
 
@@ -349,6 +365,24 @@ def test_one_submission_is_a_job_of_its_own(tmp_path):
     }
 
 
+def test_what_breaks_the_grader_costs_one_submission_and_is_told(tmp_path, monkeypatch, capsys):
+    for name in ("ann", "bob"):
+        write(tmp_path / "class", name, SOLVED)
+    right = grading.grade
+
+    def breaks(entry, ids, seed):
+        if entry.name == "ann":
+            raise RuntimeError("a bug of ours")
+        return right(entry, ids, seed)
+
+    monkeypatch.setattr(grading, "grade", breaks)
+    assert main([str(tmp_path / "class"), "--out", str(tmp_path / "out")]) == 1
+    assert "ann: NOT GRADED" in capsys.readouterr().err
+    assert set(grades(tmp_path / "out")) == {"bob"}
+    rows = list(csv.reader((tmp_path / "out" / "class.csv").open()))
+    assert [row[0] for row in rows] == ["submission", "ann", "bob"] and "a bug of ours" in rows[1][-1]
+
+
 def test_a_wrong_folder_is_one_sentence(tmp_path, capsys):
     assert main([str(tmp_path / "nowhere")]) == 2
     assert capsys.readouterr().err.count("\n") == 1
@@ -367,7 +401,8 @@ def test_without_bubblewrap_there_is_a_warning_and_the_limits_stay(tmp_path, mon
     names = ["sleep", "fork bomb, quiet", "a full disk", "opens a socket", "imports the answer", "100 GB"]
     names += READERS if has_landlock() else []
     for name in names:
-        write(tmp_path / "class", name, answered(BAD[name][0].replace("CLASS", repr(str(tmp_path / "class")))))
+        source = BAD[name][0].replace("CLASS", repr(str(tmp_path / "class")))
+        write(tmp_path / "class", name, answered(source))
     assert main([str(tmp_path / "class"), "--out", str(tmp_path / "out"), "--notebooks", "6"]) == 0
     assert "bubblewrap is not installed" in capsys.readouterr().err
     assert {n: g[:2] for n, g in grades(tmp_path / "out").items()} == {n: (BAD[n][1], REST) for n in names}

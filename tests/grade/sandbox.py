@@ -1,8 +1,8 @@
 """A place for a student's code: a process that cannot read, write, send or stay.
 
-Two walls: bubblewrap (`bwrap`), where it is installed, shows it the Python installation and nothing else of the
-disk, no other process, no network. Inside, the process gives up files, calls and resources itself (Landlock,
-seccomp, limits, see `cell/worker.py`). `warning` says what is missing on this machine.
+Two walls: bubblewrap (`bwrap`), where it is installed, shows it the Python installation and nothing else of
+the disk, no other process, no network. Inside, the process gives up files, calls and resources itself
+(Landlock, seccomp, limits, see `cell/worker.py`). `warning` says what is missing on this machine.
 """
 
 from __future__ import annotations
@@ -43,7 +43,9 @@ def warning() -> str:
     files = "the kernel alone (Landlock) keeps this machine's files from the code of submissions"
     if not has_landlock():
         files = "the code of submissions can READ THE FILES of this machine, solutions included"
-    return f"bubblewrap is not installed: {files}. Install it (Debian: apt install bubblewrap) before you grade."
+    return (
+        f"bubblewrap is not installed: {files}. Install it before you grade (Debian: apt install bubblewrap)"
+    )
 
 
 def command(fd: int) -> list[str]:

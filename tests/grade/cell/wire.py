@@ -12,6 +12,7 @@ import numpy as np
 
 MOST = 64 << 20  # bytes of one message
 DEEPEST = 20  # levels of lists in lists
+LARGEST = 1 << 63  # ints from here on are no numbers to numpy
 DTYPES = {
     f"{kind}{size}"
     for kind, sizes in {"f": (2, 4, 8), "i": (1, 2, 4, 8), "u": (1, 2, 4, 8)}.items()
@@ -47,7 +48,7 @@ def encode(value) -> bytes:
         if x is None or kind in (bool, str):
             return {"v": x}
         if kind is int:
-            return {"int": str(x)} if abs(x) < 1 << 200 else {"other": "a huge int"}
+            return {"int": str(x)} if abs(x) < LARGEST else {"other": "a huge int"}
         if kind is float:
             return {"float": x.hex() if math.isfinite(x) else repr(x)}
         if kind in (list, tuple):
@@ -93,7 +94,7 @@ def decode(data: bytes, tensor=None):
                     raise Garbage("not a plain value")
                 return x["v"]
             if "int" in x:
-                if len(x["int"]) > 70:
+                if len(x["int"]) > 20 or abs(int(x["int"])) >= LARGEST:
                     raise Garbage("a huge int")
                 return int(x["int"])
             if "float" in x:

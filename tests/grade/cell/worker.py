@@ -1,7 +1,7 @@
 """The process where a student's code runs: it gets source and inputs, and returns values. It judges nothing.
 
-Started as `python -I worker.py FD READABLE...`, best inside bubblewrap. It imports the slow libraries once, and
-forks for every exercise; the fork confines itself before it runs a line of the student's.
+Started as `python -I worker.py FD READABLE...`, best inside bubblewrap. It imports the slow libraries once,
+and forks for every exercise; the fork confines itself before it runs a line of the student's.
 """
 
 import contextlib
@@ -70,7 +70,7 @@ def _prctl(option: int, *args) -> None:
 
 
 CREATE_RULESET, ADD_RULE, RESTRICT_SELF = 444, 445, 446
-EVERY_ACCESS = (1 << 13) - 1  # to files, in Landlock's first version: execute, write, read, list, remove, make
+EVERY_ACCESS = (1 << 13) - 1  # all that Landlock's first version knows: execute, write, read, list, make ...
 READ_FILE, READ_DIR = 1 << 2, 1 << 3
 
 
