@@ -17,8 +17,7 @@ LEAST_STEP = 0.1  # of the robot's step: what moves less from frame to frame res
 REST = 5  # frames of a rest that stay, 0.2 s: movements start and end slowly; without them the robot is
 # always late, and hits a sliding puck too hard to catch up
 MOST_OF_HORIZON = 0.7  # the demonstration's share of an episode, so that time is left to reach its goal
-MENDS = ("trim", "speed", "include_goal", "weights", "timed")  # the switches of `KeypointReward`
-STILL = 0.1  # of the widest keypoint's extent: a keypoint that moves less takes no part in the skill
+MENDS = ("trim", "speed", "include_goal", "timed")  # the switches of `KeypointReward`
 
 
 def _steps(z):
@@ -32,15 +31,6 @@ def _median_step(z):
 def _top_step(z):
     # 90th percentile: resets of a random video, one frame in twenty, stay out.
     return float(np.quantile(np.linalg.norm(_steps(z), axis=1), 0.9))
-
-
-def keypoint_noise(video: np.ndarray) -> np.ndarray:
-    """Jitter (K,) of each coordinate, one standard deviation, from second differences of z (M, K, 2).
-
-    Smooth motion all but cancels in them, and the median passes over resets and lost keypoints.
-    """
-    bend = video[2:] - 2 * video[1:-1] + video[:-2]  # variance 1 + 4 + 1 = 6 times the jitter's
-    return 1.4826 * np.median(np.abs(bend), axis=(0, 2)) / np.sqrt(6)
 
 
 def trim_pauses(z: np.ndarray, least: float, rest: int = 0) -> np.ndarray:
@@ -82,33 +72,19 @@ def prepare(z, robot, *, horizon=None, trim=True, speed=True) -> np.ndarray:
     return resample(z, _top_step(robot), longest) if speed else z
 
 
-def keypoint_weights(z: np.ndarray, robot: np.ndarray) -> np.ndarray:
-    """How much each keypoint of the demonstration z (N, K, 2) counts: (K,), of sum 1.
-
-    What random motion (M, K, 2) seldom moves is what the skill is about: a pushed object has one
-    keypoint, the arm has four. The root keeps the arm's lead to the object; jitter sets a floor. A
-    keypoint that hardly moves in the demonstration counts nothing: it would add jitter alone.
-    """
-    step, noise = _steps(robot), keypoint_noise(robot)
-    typical = np.minimum(step, _median_step(robot)).mean(0)  # the minimum takes out resets
-    extent = np.linalg.norm(z - z[0], axis=-1).max(0)
-    w = (extent > np.maximum(STILL * extent.max(), 6 * noise)) / np.sqrt(np.maximum(typical, noise) + 1e-6)
-    return w / w.sum() if w.any() else np.full(len(w), 1 / len(w))
-
-
 class KeypointReward:
     """r_t = lambda_r1 r1(t) + lambda_r2 r2(t), Eq. 8. A pure function of z_t, z_{t+1} and, if `timed`, t.
 
     trajectory: z^E (N, K, 2) in [-1, 1], N >= 3. robot: keypoints (M, K, 2) of the robot's random
-    video, which the mended form needs for the robot's pace and the jitter. horizon: steps of an
-    episode; the prepared demonstration takes at most 70 % of it. lam: (lambda_r1, lambda_r2).
+    video, which the mended form needs for the robot's pace. horizon: steps of an episode; the prepared
+    demonstration takes at most 70 % of it. lam: (lambda_r1, lambda_r2).
 
     The mends: `trim` cuts pauses, which make idling look like the skill; `speed` slows the
-    demonstration down to the robot's pace where it is faster; `include_goal` lets p reach N; `weights`
-    weighs keypoints (off: all alike); `timed` takes p = q = t instead of the nearest frame, so that
-    falling behind costs. The mended reward also judges z_{t+1}, which a_t can still change, where Eq. 9
-    judges z_t, and adds up lengths per keypoint, each capped at twice the path: a lost keypoint costs a
-    bounded share. Its unit: r1 = -1 is an arm that never moved, seen at the end. It lies in [-2 sum(lam), 0].
+    demonstration down to the robot's pace where it is faster; `include_goal` lets p reach N; `timed` takes
+    p = q = t instead of the nearest frame, so that falling behind costs. The mended reward also judges
+    z_{t+1}, which a_t can still change, where Eq. 9 judges z_t, and takes the mean length over keypoints,
+    each capped at twice the mean path: a lost keypoint costs a bounded share. Its unit: r1 = -1 is an arm
+    that never moved, seen at the end. It lies in [-2 sum(lam), 0].
 
     Raises InputError where shapes do not fit or nothing moves in the demonstration.
     """
@@ -124,7 +100,6 @@ class KeypointReward:
         trim: bool = True,
         speed: bool = True,
         include_goal: bool = True,
-        weights: bool = True,
         timed: bool = True,
     ):
         z = np.asarray(trajectory, np.float64)
@@ -141,8 +116,7 @@ class KeypointReward:
                     f"robot keypoints of shape {robot.shape}: give (M, {z.shape[1]}, 2), M >= 3."
                 )
             z = prepare(z, robot, horizon=horizon, trim=trim, speed=speed)
-            self.w = keypoint_weights(z, robot) if weights else np.full(z.shape[1], 1 / z.shape[1])
-            self.path = self.w @ np.linalg.norm(z - z[0], axis=-1).max(0)
+            self.path = np.linalg.norm(z - z[0], axis=-1).max(0).mean()
             if self.path < 1e-6:
                 raise InputError("nothing moves in the demonstration; give a video that shows the skill.")
         self.z_E = z  # (N, K, 2)
@@ -161,7 +135,7 @@ class KeypointReward:
         """Norm of the differences d (..., K, 2) over all keypoints: (...)."""
         if self.literal:
             return np.sqrt(np.square(d).sum((-2, -1)))
-        return np.minimum(np.linalg.norm(d, axis=-1), 2 * self.path) @ self.w / self.path
+        return np.minimum(np.linalg.norm(d, axis=-1), 2 * self.path).mean(-1) / self.path
 
     def __call__(self, z, z_next, t: int = 0) -> tuple[float, dict[str, float]]:
         """r_t and its parts {"r1", "r2"} of z_t, z_{t+1} (K, 2) at step t = 0, 1, ... of the episode."""

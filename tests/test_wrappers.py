@@ -106,16 +106,17 @@ def test_a_difference_in_the_frames_changes_observation_and_reward(reward):
 
 def test_literal_policy_sees_keypoints_alone(reward):
     size = wrap(ToyPush(), reward).observation_space.shape
-    assert size == ((6 * K + 1,) if reward.timed else (2 * K,))
+    assert size == ((8 * K + 1,) if reward.timed else (2 * K,))
 
 
 def test_timed_observation_tells_the_way_to_the_demonstration_and_the_clock():
     reward = KeypointReward(detect(demonstration()), detect(random_frames(300)), horizon=50)
     env = wrap(Film(demonstration()), reward)
     observations, _ = play(env, 3)
-    z, moved, way, clock = np.split(observations[2], [2 * K, 4 * K, 6 * K])
+    z, moved, before, way, clock = np.split(observations[2], [2 * K, 4 * K, 6 * K, 8 * K])
     np.testing.assert_array_equal(moved, z - observations[1][: 2 * K])
-    assert not observations[0][2 * K : 4 * K].any()  # nothing has moved at the start
+    np.testing.assert_array_equal(before, observations[1][2 * K : 4 * K])
+    assert not observations[0][2 * K : 6 * K].any()  # nothing has moved at the start
     assert (z + way).reshape(K, 2) == pytest.approx(reward.z_E[3], abs=1e-6)
     assert clock[0] == pytest.approx(2 / (len(reward) - 1))
 
