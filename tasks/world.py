@@ -166,6 +166,13 @@ class World:
         for link in range(-1, self.p.getNumJoints(body)):
             self.p.changeDynamics(body, link, linearDamping=0, angularDamping=0, jointDamping=0)
 
+    def take_apart(self) -> None:
+        """Put all that moves freely where nothing touches."""
+        for i in range(self.p.getNumBodies()):
+            body = self.p.getBodyUniqueId(i)
+            if self.p.getDynamicsInfo(body, -1)[0] > 0:  # neither scenery nor an arm nor a rail
+                self.p.resetBasePositionAndOrientation(body, (0, 10 + i, 10), (0, 0, 0, 1))
+
     def render(self) -> np.ndarray:
         """The camera's picture, (84, 84, 3) uint8 RGB."""
         return cv2.resize(self._composite()[0], (SIZE, SIZE), interpolation=cv2.INTER_AREA)
@@ -237,7 +244,9 @@ class TaskEnv(gym.Env):
         self.arm = Arm(self.world.p, embodiment, self.KP)
         self.build()
         self.world.p.stepSimulation()  # a world that never stepped behaves unlike one that did
-        self._fresh = self.world.p.saveState()  # contact caches too, which a reset of poses keeps
+        self._fresh = self.world.p.saveState()
+        self.world.take_apart()
+        self._apart = self.world.p.saveState()
 
     # What a task file writes ------------------------------------------------------------------------
 
@@ -271,6 +280,8 @@ class TaskEnv(gym.Env):
 
     def reset(self, *, seed=None, options=None):
         super().reset(seed=seed)
+        self.world.p.restoreState(self._apart)
+        self.world.p.performCollisionDetection()  # Bullet forgets contacts of the last episode only so
         self.world.p.restoreState(self._fresh)
         offset = self.np_random.uniform(-self.jitter, self.jitter, 4)
         scatter = bool((options or {}).get("scatter", False))
