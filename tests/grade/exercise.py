@@ -168,6 +168,8 @@ def different(got, want, check: Check) -> str | None:
     if isinstance(want, np.ndarray) or _is_number(want):
         return _different_numbers(got, want, check)
     if isinstance(want, list | tuple):
+        if isinstance(got, np.ndarray) and got.ndim:
+            got = list(got)  # np.quantile and others return an array where one asks for two numbers
         if not isinstance(got, list | tuple) or len(got) != len(want):
             return f"it returns {_kind(got)}; expected {_kind(want)}"
         for i, pair in enumerate(zip(got, want, strict=True)):

@@ -6,6 +6,7 @@ The judge makes the inputs, keeps the references and compares; how an answer is 
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -69,10 +70,10 @@ def judge(exercise: Exercise, call, seed: int = 0) -> Result:
     reference = exercise.run(exercise.source)
     mistakes = [(m.hint, exercise.run(exercise.wrong(m))) for m in exercise.mistakes]
     result, lost, first = Result(exercise.id, exercise.title), "", None
-    answers, truths = set(), set()
+    answers, truths, guesses = set(), set(), []
     for i, check in enumerate(exercise.checks):
         rng = np.random.default_rng([seed, i])
-        message = lost
+        message, hints = lost, []
         for _ in range(check.trials):
             if message:
                 break
@@ -87,12 +88,18 @@ def judge(exercise: Exercise, call, seed: int = 0) -> Result:
             want = reference(args)
             answers.add(encode(got))
             truths.add(encode(want))
-            message = _message(check, got, want, args, mistakes)
+            message = _message(check, got, want, args)
+            hints = [h for h, wrong in mistakes if _same(check, got, wrong(args), want)] if message else []
             if not message and changed:
                 message = "it changes its inputs: work on a copy"
             if not message and first is None:
                 first = args, got
         result.outcomes.append(Outcome(check.label, 0 if message else check.points, check.points, message))
+        guesses.append(hints)
+    # On some inputs two mistakes give the same answer; the one that explains most checks is it.
+    votes = Counter(hint for hints in guesses for hint in hints)
+    for outcome, hints in zip(result.outcomes, guesses, strict=True):
+        outcome.message = max(hints, key=votes.get, default=outcome.message)
     if first and not lost:
         same = len(answers) == 1 < len(truths)
         message = "it returns the same, whatever it is given" if same else _repeat(first, call)
@@ -102,7 +109,7 @@ def judge(exercise: Exercise, call, seed: int = 0) -> Result:
     return result
 
 
-def _message(check: Check, got, want, args, mistakes) -> str:
+def _message(check: Check, got, want, args) -> str:
     wrong = check.verify(got, args) if check.verify else different(got, want, check)
     if not wrong:
         return ""
@@ -110,11 +117,14 @@ def _message(check: Check, got, want, args, mistakes) -> str:
         return got.text
     if type(got) is Raised and got == "MemoryError":
         return "it needs more memory than an exercise may take (2 GB)"
-    for hint, answer in mistakes:
-        theirs = answer(args)
-        if type(theirs) is not Other and not different(got, theirs, check) and different(want, theirs, check):
-            return hint
     return wrong
+
+
+def _same(check: Check, got, theirs, want) -> bool:
+    """Whether the answer is that of a mistake, and not right."""
+    if type(theirs) is Other or (type(theirs) is Raised and theirs.text != getattr(got, "text", None)):
+        return False
+    return not different(got, theirs, check) and bool(different(want, theirs, check))
 
 
 def _repeat(first, call) -> str:

@@ -28,4 +28,5 @@ def test_exercise(exercise, box, code):
     if source is None or STUB in source:
         pytest.skip("still open")
     result = grade_one(exercise, source, box)
-    assert result.points == result.most, "\n".join(["", *result.lines()])
+    if result.points < result.most:  # a traceback would show the reference
+        pytest.fail("\n".join(["", *result.lines()]), pytrace=False)

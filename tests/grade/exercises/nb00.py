@@ -13,6 +13,10 @@ def success_rate(distances, threshold):
 success_rate.check("ten episodes", lambda rng: (rng.uniform(0, 0.1, 10), 0.05))
 success_rate.check("any number of episodes, any threshold", lambda rng: (rng.uniform(0, 1, 37), 0.3))
 success_rate.check("all of them", lambda rng: (rng.uniform(0, 0.04, 5), 0.05))
+success_rate.check(
+    "a distance equal to the threshold is not below it",
+    lambda rng: (np.append(rng.choice([0.125, 0.25, 0.5], 11), 0.25), 0.25),
+)
 success_rate.mistake(
     "You count the failures: an episode succeeds where its distance is below the threshold.",
     "distances < threshold",
@@ -30,6 +34,11 @@ success_rate.mistake(
     "You divide by ten; divide by the number of episodes there are.",
     "(distances < threshold).mean()",
     "(distances < threshold).sum() / 10",
+)
+success_rate.mistake(
+    "An episode at exactly the threshold is not below it: <, not <=.",
+    "distances < threshold",
+    "distances <= threshold",
 )
 
 
@@ -53,6 +62,11 @@ to_pixels.mistake(
 )
 to_pixels.mistake(
     "From -1 to 1 it is 2 units, from edge to edge `size` pixels: halve.", "(z + 1) / 2", "(z + 1)"
+)
+to_pixels.mistake(
+    "-1 and 1 are the edges of the picture, `size` pixels apart, not the centres of its outer pixels.",
+    "/ 2 * size",
+    "/ 2 * (size - 1)",
 )
 to_pixels.mistake(
     "x comes first in both: column before row.", "(z + 1) / 2 * size", "(z[..., ::-1] + 1) / 2 * size"

@@ -77,6 +77,12 @@ osc.mistake(
     "",
 )
 osc.mistake("Damping pulls against the speed: its sign is minus.", "- kd * v", "+ kd * v")
+osc.mistake("h is the torque that carries the arm: add it, do not take it away.", " + h", " - h")
+osc.mistake(
+    "e leads from the tip to the goal, so the spring pulls along it: kp e has a plus.",
+    "kp * e - kd * v",
+    "-kp * e - kd * v",
+)
 osc.mistake("Critical damping is kd = 2 sqrt(kp).", "2 * np.sqrt(kp)", "np.sqrt(kp)")
 
 
@@ -99,6 +105,11 @@ nullspace.mistake(
     "You return the part the tip does feel: subtract it from the identity.", "np.eye(len(M)) - ", ""
 )
 nullspace.mistake(
+    "An arm may have any number of joints n, the size of M: the identity is (n, n), not (7, 7).",
+    "np.eye(len(M))",
+    "np.eye(7)",
+)
+nullspace.mistake(
     "That is N, which acts on velocities; torques need its transpose.",
     "J.T @ task_inertia(J, M) @ J @ np.linalg.inv(M)",
     "np.linalg.inv(M) @ J.T @ task_inertia(J, M) @ J",
@@ -110,20 +121,26 @@ nullspace.mistake(
     "An environment",
     given=("import gymnasium as gym",),
     probe="""
-    def probe(actions, seed):
+    def probe(actions, seed, ask):
         env = Point()
-        start, info = env.reset(seed=seed)
-        rows = [env.step(action) for action in actions]
-        obs, reward, terminated, truncated, infos = zip(*rows)
-        return {
-            "start": start, "obs": np.stack(obs), "reward": np.array(reward, float),
-            "terminated": [bool(x) for x in terminated], "truncated": [bool(x) for x in truncated],
-            "success": [bool(i["is_success"]) for i in infos],
-        }
+        episodes = []
+        for seed in (seed, None) if ask == "two episodes" else (seed,):
+            start, info = env.reset(seed=seed)
+            rows = [env.step(action) for action in actions]
+            obs, reward, terminated, truncated, infos = zip(*rows)
+            episodes.append({
+                "start": start, "obs": np.stack(obs), "reward": np.array(reward, float),
+                "terminated": [bool(x) for x in terminated], "truncated": [bool(x) for x in truncated],
+                "success": [bool(i["is_success"]) for i in infos],
+            })
+        if ask == "kind":
+            kinds = [f"{x.dtype} of shape {x.shape}" for x in map(np.asarray, (start, *obs))]
+            return {"reset": kinds[0], "step": kinds[-1], "place": float(start[0])}
+        return episodes if ask == "two episodes" else episodes[0]
     """,
 )
 class Point(gym.Env):
-    observation_space = gym.spaces.Box(-2, 2, (1,), np.float32)
+    observation_space = gym.spaces.Box(-4, 4, (1,), np.float32)
     action_space = gym.spaces.Box(-1, 1, (1,), np.float32)
 
     def reset(self, *, seed=None, options=None):
@@ -138,11 +155,28 @@ class Point(gym.Env):
         return np.array([self.x], np.float32), float(done), False, self.t >= 50, {"is_success": done}
 
 
-Point.check("a random walk", lambda rng: (rng.uniform(-1, 1, (20, 1)), int(rng.integers(1000))))
+def _walk(rng, most=1, steps=20, ask="episode"):
+    return rng.uniform(-most, most, (steps, 1)), int(rng.integers(1000)), ask
+
+
+def _home(rng):
+    """From its start straight to 0, and about it until the 45th step."""
+    seed = int(rng.integers(1000))
+    start = gym.utils.seeding.np_random(seed)[0].uniform(-1, 1)
+    steps = np.sign(-start) * np.ones(int(abs(start) / 0.05))
+    return np.append(steps, rng.uniform(-1, 1, 45 - len(steps)))[:, None], seed, "episode"
+
+
+Point.check("a random walk", _walk)
+Point.check("actions out of bounds are clipped", lambda rng: _walk(rng, 4))
+Point.check("at 0 there is reward and success, and it goes on", _home)
 Point.check(
-    "actions out of bounds are clipped", lambda rng: (rng.uniform(-4, 4, (20, 1)), int(rng.integers(1000)))
+    "after 50 steps it is truncated, never terminated, and reset begins anew",
+    lambda rng: _walk(rng, 1, 51, "two episodes"),
 )
-Point.check("after 50 steps it is truncated, never terminated", lambda rng: (rng.uniform(-1, 1, (51, 1)), 3))
+Point.check(
+    "its observations are of the kind that observation_space promises", lambda rng: _walk(rng, 1, 2, "kind")
+)
 Point.mistake(
     "The seed never reaches the generator: call super().reset(seed=seed) first.",
     "super().reset(seed=seed)",
@@ -160,4 +194,32 @@ Point.mistake(
 )
 Point.mistake(
     "The fiftieth step is the last: count steps, and compare with >=.", "self.t >= 50", "self.t > 50"
+)
+Point.mistake(
+    "Success does not end the episode: it never terminates.", "float(done), False", "float(done), done"
+)
+Point.mistake(
+    "At 0 the reward is 1.0 and is_success is True: yours never say so.",
+    "float(done), False",
+    "0.0, False",
+    '{"is_success": done}',
+    '{"is_success": False}',
+)
+Point.mistake("Success is |x| < 0.05; your bound is another.", "< 0.05", "< 0.1")
+Point.mistake(
+    "Success is judged after the move, where the observation is: yours is judged before it.",
+    "        done = abs(self.x) < 0.05\n",
+    "",
+    "self.x += 0.05",
+    "done = abs(self.x) < 0.05\n        self.x += 0.05",
+)
+Point.mistake(
+    "Every episode has its own 50 steps: set the counter back in reset.",
+    "self.np_random.uniform(-1, 1), 0",
+    'self.np_random.uniform(-1, 1), getattr(self, "t", 0)',
+)
+Point.mistake(
+    "An observation is float32, as observation_space says: np.array([x], np.float32), also in step.",
+    "np.array([self.x], np.float32)",
+    "np.array([self.x])",
 )

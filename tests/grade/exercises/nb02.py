@@ -17,7 +17,25 @@ def _uniform(rng, low, high, *shape):
     return torch.from_numpy(np.asarray(rng.uniform(low, high, shape), np.float32))
 
 
-@exercise("2.1", "The log-density of a squashed Gaussian")
+@exercise(
+    "2.1",
+    "The log-density of a squashed Gaussian",
+    probe="""
+    def probe(mean, log_std, noise, ask="values"):
+        if ask == "values":
+            return squash(mean, log_std, noise)
+        found = {}
+        for i, name in enumerate(("actions", "log-densities")):
+            leaves = mean.clone().requires_grad_(), log_std.clone().requires_grad_()
+            out = squash(*leaves, noise)[i]
+            if out.requires_grad:
+                out.sum().backward()
+            for leaf, of in zip(leaves, ("mean", "log_std")):
+                gradient = torch.zeros_like(leaf) if leaf.grad is None else leaf.grad
+                found[f"gradient of the {name} for {of}"] = gradient
+        return found
+    """,
+)
 def squash(mean, log_std, noise):
     u = mean + log_std.exp() * noise
     log_normal = -log_std - 0.5 * noise**2 - 0.5 * math.log(2 * math.pi)
@@ -56,6 +74,29 @@ def _far_out(rng):
 squash.check("actions and log-densities near the middle", _moderate, atol=1e-3)
 squash.check("the density over all actions adds up to 1", _one_action, atol=1e-3, verify=_adds_up_to_one)
 squash.check("far out, where tanh is flat, it stays finite and right", _far_out, points=2)
+squash.check("their gradients reach mean and log_std", lambda rng: (*_moderate(rng), "gradient"), atol=1e-3)
+squash.mistake(
+    "The values are right, but the gradient does not pass through u: leave detach out, the noise "
+    "comes from outside.",
+    "u = mean + log_std.exp() * noise",
+    "u = (mean + log_std.exp() * noise).detach()",
+)
+squash.mistake(
+    "The values are right, but the gradient does not pass through the tanh's correction: no detach there.",
+    "log_slope = 2 * (math.log(2) - u - F.softplus(-2 * u))",
+    "log_slope = (2 * (math.log(2) - u - F.softplus(-2 * u))).detach()",
+)
+squash.mistake(
+    "The values are right, but no gradient leaves your function: no torch.no_grad, no numpy, no detach at "
+    "the end.",
+    "torch.tanh(u), (log_normal - log_slope).sum(-1)",
+    "torch.tanh(u).detach(), (log_normal - log_slope).sum(-1).detach()",
+)
+squash.mistake(
+    "The noise is scaled by sigma, and what you are given is its logarithm: log_std.exp().",
+    "log_std.exp() * noise",
+    "log_std * noise",
+)
 squash.mistake(
     "This is the density of u, before the tanh. The tanh squeezes the axis: which term says by how much?",
     "(log_normal - log_slope)",
@@ -123,6 +164,11 @@ critic_target.mistake(
     "You average the two critics: an error upwards of one still gets in. Take the smaller, number by number.",
     "torch.minimum(q1, q2)",
     "0.5 * (q1 + q2)",
+)
+critic_target.mistake(
+    "Take the smaller of the two number by number; yours is the smallest of the whole batch.",
+    "torch.minimum(q1, q2)",
+    "torch.minimum(q1, q2).min()",
 )
 critic_target.mistake(
     "The soft value of Eq. 3 has an entropy term, and yours has none: alpha and log_pi are unused.",
@@ -199,6 +245,12 @@ follow.mistake(
     "You add a share of the online weights but keep all of the old ones: the two shares have to sum to 1.",
     "(1 - tau) * slow + tau * fast",
     "slow + tau * fast",
+)
+follow.mistake(
+    "The copy does not change: `p = ...` names a new tensor. Write into the old one, p.copy_(...) "
+    "or the like.",
+    "slow.copy_((1 - tau) * slow + tau * fast)",
+    "slow = (1 - tau) * slow + tau * fast",
 )
 follow.mistake(
     "You move the online network towards the copy: the online one is the optimizer's alone.",
@@ -282,6 +334,9 @@ temperature_loss.mistake(
 temperature_loss.mistake(
     "Eq. 18 is an expectation: the mean over the batch, not its sum.", ".mean()", ".sum()"
 )
+temperature_loss.mistake(
+    "The loss is one number, the mean over the batch; yours still has one for each row.", ".mean()", ""
+)
 
 
 @exercise(
@@ -329,12 +384,31 @@ actor_loss.mistake(
     "amax(0)",
 )
 actor_loss.mistake(
+    "Your loss has the opposite sign: it is made small, so it is alpha log pi minus Q.",
+    "(log_alpha.exp().detach() * log_pi - q)",
+    "(q - log_alpha.exp().detach() * log_pi)",
+)
+actor_loss.mistake(
+    "You average the two critics: believe the smaller one, number by number.", "amin(0)", "mean(0)"
+)
+actor_loss.mistake(
+    "Take the smaller critic number by number; yours is the smallest value of the whole batch.",
+    "amin(0)",
+    "amin()",
+)
+actor_loss.mistake(
+    "The loss's value is right, but the entropy's gradient does not reach the actor: log_pi keeps its graph.",
+    "* log_pi - q",
+    "* log_pi.detach() - q",
+)
+actor_loss.mistake(
     "Your loss has no entropy term: alpha and log_pi are unused.",
     "(log_alpha.exp().detach() * log_pi - q)",
     "(-q)",
 )
 actor_loss.mistake(
-    "The loss's value is right, but the critics' slope does not reach the actor: you cut the graph at a.",
+    "The loss's value is right, but the critics' slope does not reach the actor: you cut the graph "
+    "at a or in the critics.",
     "critics(s, a)",
     "critics(s, a.detach())",
 )
@@ -350,4 +424,9 @@ actor_loss.mistake(
 )
 actor_loss.mistake(
     "Eq. 7 is an expectation: the mean over the batch, not its sum.", "- q).mean()", "- q).sum()"
+)
+actor_loss.mistake(
+    "The loss is one number, the mean over the batch; yours still has one for each state.",
+    "- q).mean()",
+    "- q)",
 )

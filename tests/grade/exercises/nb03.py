@@ -51,23 +51,52 @@ minimum_jerk.mistake(
     probe="""
     import pybullet as p
 
-    def probe(speed):
+    import pybullet as p
+
+    def _body(body, client):
+        low, high = p.getAABB(body, -1, client)
+        place, _ = p.getBasePositionAndOrientation(body, client)
+        mass, friction = p.getDynamicsInfo(body, -1, client)[:2]
+        return {"mass": mass, "friction": friction, "place": np.array(place), "size": np.subtract(high, low)}
+
+    def _world(client):
+        n = p.getNumBodies(client)
+        frictions = [p.getDynamicsInfo(p.getBodyUniqueId(i, client), -1, client)[1] for i in range(n)]
+        shape = p.createCollisionShape(p.GEOM_SPHERE, radius=1, physicsClientId=client)
+        return shape, frictions
+
+    def probe(speed, ask):
+        other = p.connect(p.DIRECT)  # a call without physicsClientId=client goes there
         client = p.connect(p.DIRECT)
         try:
+            for _ in range(2):  # what such a call changes there
+                p.createMultiBody(1, physicsClientId=other)
+            shape, frictions = _world(other)
             p.setGravity(0, 0, -9.81, client)
             p.setTimeStep(1 / 250, client)
-            table, cube = make_push(client)
-            mu = [p.getDynamicsInfo(body, -1, client)[1] for body in (table, cube)]
-            mass = p.getDynamicsInfo(cube, -1, client)[0]
-            place = p.getBasePositionAndOrientation(cube, client)[0]
-            p.resetBaseVelocity(cube, (speed, 0, 0), physicsClientId=client)
+            try:
+                table, cube = make_push(client)
+            finally:
+                if _world(other) != (shape + 1, frictions):
+                    raise ValueError("a call went to another world: physicsClientId=client in every one")
+            if p.getNumBodies(client) < 2:
+                raise ValueError("two bodies are not in this world: physicsClientId=client in every call")
+            if ask == "bodies":
+                return {"table": _body(table, client), "cube": _body(cube, client)}
+            if ask == "flight":  # nothing in the way, no weight
+                p.setGravity(0, 0, 0, client)
+                p.resetBasePositionAndOrientation(cube, (0, 0, 9), (0, 0, 0, 1), client)
+            p.resetBaseVelocity(cube, (speed, 0, 0), (0, 0, speed * (ask == "flight")), client)
             for _ in range(500):
                 p.stepSimulation(client)
+            if ask == "flight":
+                v, w = p.getBaseVelocity(cube, client)
+                return {"share of its speed after 2 s": v[0] / speed, "share of its turning": w[2] / speed}
             end = p.getBasePositionAndOrientation(cube, client)[0]
-            return {"friction": mu[0] * mu[1], "mass": mass, "place": list(place), "slid": end[0] - place[0],
-                    "height": end[2]}
+            return {"slid to x": end[0], "height": end[2]}
         finally:
             p.disconnect(client)
+            p.disconnect(other)
     """,
 )
 def make_push(client):
@@ -80,13 +109,15 @@ def make_push(client):
     return table, cube
 
 
+def _speed(rng, ask):
+    return float(rng.uniform(0.3, 0.6)), ask
+
+
+make_push.check("both stand where they should, with mass and friction", lambda rng: _speed(rng, "bodies"))
+make_push.check("it slides as it should", lambda rng: _speed(rng, "slide"), atol=2e-3)
 make_push.check(
-    "it stands where it should, and slides as it should",
-    lambda rng: (float(rng.uniform(0.3, 0.6)),),
-    points=2,
-    atol=3e-3,
+    "flying free it keeps its speed and its turning", lambda rng: _speed(rng, "flight"), atol=2e-3
 )
-make_push.check("at rest it stays at rest", lambda rng: (0.0,), atol=2e-3)
 make_push.mistake(
     "Bullet multiplies both bodies' friction, and a table has 0.5 at birth: set the table's, too.",
     "p.changeDynamics(table, -1, lateralFriction=1.0, physicsClientId=client)",
@@ -98,9 +129,49 @@ make_push.mistake(
     "halfExtents=(0.05, 0.05, 0.05)",
 )
 make_push.mistake(
+    "halfExtents are half the edges: your table is twice as large.",
+    "halfExtents=(0.8, 0.3, 0.02)",
+    "halfExtents=(1.6, 0.6, 0.04)",
+)
+make_push.mistake(
+    "halfExtents are half the edges: your table and your cube are twice as large.",
+    "halfExtents=(0.8, 0.3, 0.02)",
+    "halfExtents=(1.6, 0.6, 0.04)",
+    "halfExtents=(0.025, 0.025, 0.025)",
+    "halfExtents=(0.05, 0.05, 0.05)",
+)
+make_push.mistake(
     "The table's top has to be at z = 0: its middle lies half its thickness below.",
     "(0.8, 0, -0.02)",
     "(0.8, 0, 0)",
+)
+make_push.mistake("The table's middle is at x = 0.8.", "(0.8, 0, -0.02)", "(0, 0, -0.02)")
+make_push.mistake(
+    "The cube stands on the table: its middle lies half an edge above z = 0.",
+    "(0.53, 0, 0.025)",
+    "(0.53, 0, 0)",
+)
+make_push.mistake(
+    "The table has friction 1.0 and the cube 0.6: yours are swapped. The product hides it from a slide.",
+    "table, -1, lateralFriction=1.0",
+    "table, -1, lateralFriction=0.6",
+    "cube, -1, lateralFriction=0.6",
+    "cube, -1, lateralFriction=1.0",
+)
+make_push.mistake(
+    "Bullet damps what moves by itself: linearDamping=0 and angularDamping=0 for the cube.",
+    ", linearDamping=0, angularDamping=0",
+    "",
+)
+make_push.mistake(
+    "Bullet still damps the cube's turning: angularDamping=0.",
+    ", angularDamping=0",
+    "",
+)
+make_push.mistake(
+    "Bullet still damps the cube's flight: linearDamping=0.",
+    ", linearDamping=0",
+    "",
 )
 make_push.mistake(
     "A body of mass 0 stands fast for ever: the cube weighs 0.4 kg.",
@@ -117,12 +188,14 @@ def moving_share(x, take, least):
 
 
 def _takes(rng, take=25, n=8):
-    x = np.repeat(rng.uniform(0.5, 0.7, n), take).reshape(n, take)
+    """Cubes that are pushed for a while, forth or back; some by just `least` a frame. Sums are exact."""
+    least = 2.0**-11
+    x = np.repeat(rng.integers(1024, 1434, n), take).reshape(n, take) * least
     for row in x:
-        if rng.random() < 0.6:
-            start = rng.integers(take - 8)
-            row[start:] += np.minimum(np.arange(take - start), 6) * rng.uniform(0.002, 0.01)
-    return x.ravel(), take, 0.0005
+        if rng.random() < 0.8:
+            start, pace = rng.integers(take - 8), rng.choice([-5, -1, 1, 8])
+            row[start:] += np.minimum(np.arange(take - start), 6) * pace * least
+    return x.ravel(), take, least
 
 
 moving_share.check("eight takes", _takes, points=2)
@@ -136,7 +209,18 @@ moving_share.mistake(
     "np.diff(x)",
 )
 moving_share.mistake(
-    "A cube pushed back moves as well: take the absolute difference.", "np.abs(np.diff", "-(np.diff"
+    "A cube pushed back moves as well: take the absolute difference.", "np.abs(np.diff", "(np.diff"
+)
+moving_share.mistake("More than `least`: a step of just `least` does not count.", "> least", ">= least")
+moving_share.mistake(
+    "A take of n frames has n - 1 transitions: divide by their number, not by that of the frames.",
+    "moved.mean()",
+    "moved.sum() / len(x)",
+)
+moving_share.mistake(
+    "A video has T - 1 transitions, but those from take to take do not count: divide by the others.",
+    "moved.mean()",
+    "moved.sum() / (len(x) - 1)",
 )
 moving_share.mistake("Return the share of the transitions, not their number.", ".mean()", ".sum()")
 moving_share.mistake(
@@ -151,12 +235,12 @@ def to_action(wanted, goal, step):
     return np.clip((wanted - goal) / step, -1, 1)
 
 
-def _wish(rng, far=1.0):
+def _wish(rng, far):
     goal = rng.normal(size=3)
     return goal + rng.uniform(-far, far, 3) * 0.03, goal, 0.03
 
 
-to_action.check("a place within one step", _wish)
+to_action.check("a place within one step", lambda rng: _wish(rng, 0.5))
 to_action.check("a place far away: full action, no more", lambda rng: _wish(rng, 5.0))
 to_action.mistake(
     "An action is at most 1: clip it.", "np.clip((wanted - goal) / step, -1, 1)", "(wanted - goal) / step"
@@ -164,6 +248,16 @@ to_action.mistake(
 to_action.mistake("An action is a share of the largest step: divide by it.", " / step", "")
 to_action.mistake(
     "It leads from the goal now to the place wanted; yours leads back.", "wanted - goal", "goal - wanted"
+)
+to_action.mistake(
+    "Clip each coordinate by itself: yours shortens the vector to length 1.",
+    "np.clip((wanted - goal) / step, -1, 1)",
+    "(wanted - goal) / step / max(1, np.linalg.norm((wanted - goal) / step))",
+)
+to_action.mistake(
+    "That is a direction, of length 1 however near the place is: divide by step.",
+    "np.clip((wanted - goal) / step, -1, 1)",
+    "(wanted - goal) / np.linalg.norm(wanted - goal)",
 )
 to_action.mistake(
     "Clip each coordinate by itself: yours shortens the whole vector.",

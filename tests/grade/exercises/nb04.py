@@ -29,6 +29,12 @@ adain.check(
     atol=1e-4,
     rtol=1e-3,
 )
+adain.check(
+    "channels that hardly vary: 1e-5 is added to the variance",
+    lambda rng: ((f := _features(rng))[0] * 1e-3, f[1], f[2]),
+    atol=1e-4,
+    rtol=1e-3,
+)
 adain.mistake(
     "You normalise over the whole batch: each image has a style of its own, so average over H and W only.",
     "(2, 3)",
@@ -44,6 +50,22 @@ adain.mistake(
     "mean[:, :, None, None] * (h - mu) / sigma + std[:, :, None, None]",
 )
 adain.mistake("First take out the features' own mean.", "(h - mu)", "h")
+adain.mistake(
+    "Your variance is divided by n - 1, as torch does by default; `unbiased=False` divides by H * W.",
+    "unbiased=False, ",
+    "",
+)
+adain.mistake(
+    "The variance is the mean of (h - mu)^2; yours is the mean of h^2, without mu.",
+    "h.var((2, 3), unbiased=False, keepdim=True)",
+    "(h**2).mean((2, 3), keepdim=True)",
+)
+adain.mistake(
+    "1e-5 is added to the variance, before the root; yours is added to the root.",
+    "(h.var((2, 3), unbiased=False, keepdim=True) + 1e-5).sqrt()",
+    "h.var((2, 3), unbiased=False, keepdim=True).sqrt() + 1e-5",
+)
+adain.mistake("Add 1e-5 to the variance; yours is without.", " + 1e-5", "")
 
 
 @exercise("4.2", "The game of Eq. 1, in squares")
@@ -57,7 +79,8 @@ def _scores(rng):
 
 gan_losses.check("scores anywhere", _scores, points=2)
 gan_losses.check(
-    "a critic that is always right", lambda rng: (torch.ones(2, 1, 3, 3), torch.zeros(2, 1, 3, 3))
+    "a critic that is always right, with more made frames than real ones",
+    lambda rng: (torch.ones(2, 1, 3, 3), torch.zeros(5, 1, 3, 3)),
 )
 gan_losses.mistake(
     "The critic's targets are swapped: real frames go to 1, made ones to 0.",
@@ -76,6 +99,21 @@ gan_losses.mistake(
 )
 gan_losses.mistake(
     "The critic has to judge both kinds; yours never sees a real frame.", "((real - 1) ** 2).mean() + ", ""
+)
+gan_losses.mistake(
+    "There may be more made scores than real ones: take the mean of each kind by itself, then add.",
+    "((real - 1) ** 2).mean() + (made**2).mean()",
+    "((real - 1) ** 2 + made**2).mean()",
+)
+gan_losses.mistake(
+    "Least squares are often written with a factor 1/2; here there is none.",
+    "return ((real - 1) ** 2).mean() + (made**2).mean(), ((made - 1) ** 2).mean()",
+    "return (((real - 1) ** 2).mean() + (made**2).mean()) / 2, ((made - 1) ** 2).mean() / 2",
+)
+gan_losses.mistake(
+    "The critic's two means are added; you take half of them.",
+    "((real - 1) ** 2).mean() + (made**2).mean()",
+    "(((real - 1) ** 2).mean() + (made**2).mean()) / 2",
 )
 
 
@@ -124,6 +162,16 @@ reconstructions.mistake(
     'style["x"](decode["x"](c_x, s_x))',
 )
 reconstructions.mistake(
+    "Yours is the style loss of y. Eq. 4 swaps the other way than Eq. 3, G_X(c_y, s_x), and reads back s_x.",
+    'style["x"](decode["x"](c_y, s_x)) - s_x',
+    'style["y"](decode["y"](c_x, s_y)) - s_y',
+)
+reconstructions.mistake(
+    "Eq. 4: the picture with style s_x is G_X(c_y, s_x); G_Y(c_x, s_y) of Eq. 3 has the style s_y.",
+    'style["x"](decode["x"](c_y, s_x))',
+    'style["x"](decode["y"](c_x, s_y))',
+)
+reconstructions.mistake(
     "The norms here are means of absolute differences, not of squares.", ".abs()", ".square()"
 )
 reconstructions.mistake(
@@ -158,6 +206,26 @@ munit_loss.mistake(
     'L["style_x"]',
     '(L["image_x"] + L["image_y"])',
     'L["image_x"]',
+)
+munit_loss.mistake(
+    "A lambda weighs both domains: mind the brackets, yours weighs x alone.",
+    '(L["image_x"] + L["image_y"])',
+    'L["image_x"] + L["image_y"]',
+    '(L["content_x"] + L["content_y"])',
+    'L["content_x"] + L["content_y"]',
+    '(L["style_x"] + L["style_y"])',
+    'L["style_x"] + L["style_y"]',
+)
+munit_loss.mistake(
+    "You leave out domain y as a whole, its part of the game, too.",
+    ' + L["gan_y"]',
+    "",
+    ' + L["image_y"]',
+    "",
+    ' + L["content_y"]',
+    "",
+    ' + L["style_y"]',
+    "",
 )
 munit_loss.mistake(
     "In Eq. 5 the game's losses have no weight: you leave them out.", 'L["gan_x"] + L["gan_y"]', "0"

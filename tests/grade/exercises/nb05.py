@@ -49,6 +49,21 @@ soft_argmax.mistake(
     "logits.softmax(-1) / logits.shape[2]",
 )
 soft_argmax.mistake(
+    "Your softmax goes over each row by itself, so that a map sums to h, not to 1: flatten its cells first.",
+    "logits.flatten(2).softmax(-1).view(logits.shape)",
+    "logits.softmax(-1)",
+)
+soft_argmax.mistake(
+    "y runs down, as the rows do: row 0 is at 1 / h - 1; yours runs up.",
+    "(2 * torch.arange(h) + 1) / h - 1",
+    "1 - (2 * torch.arange(h) + 1) / h",
+)
+soft_argmax.mistake(
+    "You return the largest cell, which has no gradient: take the mean place under the softmax.",
+    "logits.flatten(2).softmax(-1)",
+    "(logits.flatten(2) == logits.flatten(2).amax(-1, keepdim=True)).float()",
+)
+soft_argmax.mistake(
     "Return places in [-1, 1], not cell numbers.",
     "(2 * torch.arange(w) + 1) / w - 1",
     "1.0 * torch.arange(w)",
@@ -101,6 +116,30 @@ heat_map.mistake(
     "/ sigma) ** 2 / 2",
 )
 heat_map.mistake(
+    "Your cells run from edge to edge: cell 0's centre is half a cell inside, at 1 / size - 1, as in 5.1.",
+    "(2 * torch.arange(size) + 1) / size - 1",
+    "torch.linspace(-1, 1, size)",
+)
+heat_map.mistake(
+    "The square of the distance stands in the exponent, (d / sigma)^2; yours has the distance itself.",
+    "torch.exp(-(((cells - z[..., 0, None]) / sigma) ** 2))",
+    "((cells - z[..., 0, None]) / sigma) ** 2",
+    "torch.exp(-(((cells - z[..., 1, None]) / sigma) ** 2))",
+    "((cells - z[..., 1, None]) / sigma) ** 2",
+    "y[..., :, None] * x[..., None, :]",
+    "torch.exp(-(y[..., :, None] + x[..., None, :]).sqrt())",
+)
+heat_map.mistake(
+    "A sum that is cut at 1 is not it: take 1 minus the product of all (1 - h_k).",
+    "1 - (1 - h).prod(1, keepdim=True)",
+    "h.sum(1, keepdim=True).clamp(max=1)",
+)
+heat_map.mistake(
+    "The largest h_k is not it: two keypoints cover more than one. Take 1 minus the product of (1 - h_k).",
+    "1 - (1 - h).prod(1, keepdim=True)",
+    "h.amax(1, keepdim=True)",
+)
+heat_map.mistake(
     "Keep a dimension of size 1 for the channels, so that H multiplies features of any number of them.",
     "prod(1, keepdim=True)",
     "prod(1)",
@@ -137,6 +176,16 @@ transport.mistake(
     "What is pasted comes from y, at y's keypoints; yours comes from x.", "h_y * phi_y", "h_y * phi_x"
 )
 transport.mistake("What is pasted stands at y's keypoints, not at x's.", "+ h_y * phi_y", "+ h_x * phi_y")
+transport.mistake(
+    "x and y are exchanged: x's features stay, y's are pasted at y's keypoints.",
+    "(1 - h_y) * phi_x + h_y * phi_y",
+    "(1 - h_y) * phi_y + h_x * phi_x",
+)
+transport.mistake(
+    "A cell is cut out if either frame has a keypoint there: (1 - H_x)(1 - H_y), which is not 1 - H_x H_y.",
+    "(1 - h_x) * (1 - h_y)",
+    "(1 - h_x * h_y)",
+)
 
 
 @exercise("5.4", "The loss (Eq. 7), weighted")
@@ -153,12 +202,32 @@ loss.check("images anywhere", _images, points=2)
 loss.check("a perfect picture costs nothing", lambda rng: ((y := _images(rng))[1], y[1].clone(), y[2]))
 loss.check(
     "a frame that is the median: every pixel counts once",
-    lambda rng: ((y := _images(rng))[0], y[2], y[2].clone()),
+    lambda rng: ((y := _images(rng))[0], y[2].expand(2, 3, 8, 8).clone(), y[2]),
 )
 loss.mistake(
     "The weight is one number a pixel: the mean over the three colours, with the channel's dimension kept.",
     ".mean(1, keepdim=True)",
     "",
+)
+loss.mistake(
+    "Take |y - median| first, then its mean over the colours: yours lets colours that go up and down cancel.",
+    ".abs().mean(1, keepdim=True)",
+    ".mean(1, keepdim=True).abs()",
+)
+loss.mistake(
+    "Do not divide by the mean weight: take the plain mean of weight times square over all entries.",
+    "(weight * (y_hat - y) ** 2).mean()",
+    "(weight * (y_hat - y) ** 2).mean() / weight.mean()",
+)
+loss.mistake(
+    "Do not divide by the weights' sum: take the plain mean over all entries.",
+    "(weight * (y_hat - y) ** 2).mean()",
+    "(weight * (y_hat - y) ** 2).sum() / weight.sum()",
+)
+loss.mistake(
+    "The weight stands beside the square; yours is squared, too.",
+    "weight * (y_hat - y) ** 2",
+    "weight**2 * (y_hat - y) ** 2",
 )
 loss.mistake(
     "Every pixel counts at least once: the weight is 1 + 10 times the difference.", "1 + 10 *", "10 *"
@@ -199,6 +268,35 @@ r2.mistake(
     "half, judge on the second.",
     "held = truth[half:]",
     "held, half = truth, 0",
+)
+r2.mistake(
+    "You fit on all frames: those you judge on must not help the fit. Fit on the first half.",
+    "A[:half], truth[:half]",
+    "A, truth",
+)
+r2.mistake(
+    "You fit on the even frames and judge on the odd ones, their neighbours: fit on the first half.",
+    "A[:half], truth[:half]",
+    "A[::2], truth[::2]",
+    "truth[half:]",
+    "truth[1::2]",
+    "A[half:]",
+    "A[1::2]",
+)
+r2.mistake(
+    "The mean below the line is that of the second half, on which you judge; yours is that of the first.",
+    "held.mean()",
+    "truth[:half].mean()",
+)
+r2.mistake(
+    "The mean below the line is that of the second half alone; yours is that of all frames.",
+    "held.mean()",
+    "truth.mean()",
+)
+r2.mistake(
+    "A squared correlation forgives a wrong scale and place: take 1 minus squared errors over spread.",
+    "1 - ((A[half:] @ W - held) ** 2).sum() / ((held - held.mean()) ** 2).sum()",
+    "np.corrcoef(A[half:] @ W, held)[0, 1] ** 2",
 )
 r2.mistake(
     "The map needs a constant: append a column of ones.", "np.ones((len(z), 1))", "np.zeros((len(z), 1))"

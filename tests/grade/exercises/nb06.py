@@ -18,6 +18,7 @@ def r1(z, z_E):
 
 r1.check("keypoints anywhere", lambda rng: (rng.normal(size=(5, 2)), _walk(rng, 20)))
 r1.check("at a frame of the demonstration it is 0", lambda rng: ((z := _walk(rng, 12))[rng.integers(11)], z))
+r1.check("at its first frame, too: p begins at 1, z_E[0]", lambda rng: ((z := _walk(rng, 12))[0], z))
 r1.check("at the last frame it is not: p ends at N - 1", lambda rng: ((z := _walk(rng, 12))[-1] + 1, z + 1))
 r1.mistake(
     "A reward is larger when the robot is nearer: Eq. 9 has a minus in front.", "-distances", "distances"
@@ -28,7 +29,18 @@ r1.mistake(
     "((z_E[:-1] - z) ** 2).sum(axis=(1, 2))",
 )
 r1.mistake("Your minimum includes the last frame: in Eq. 9 p ends at N - 1.", "z_E[:-1]", "z_E")
+r1.mistake("Your minimum leaves out the first frame: p = 1 is z_E[0] in Python.", "z_E[:-1]", "z_E[1:-1]")
 r1.mistake("Eq. 9 takes the nearest frame, a minimum over p; you take the mean.", ".min()", ".mean()")
+r1.mistake(
+    "You take the mean distance of a keypoint: the norm is one length of all 2K numbers.",
+    "np.sqrt(((z_E[:-1] - z) ** 2).sum(axis=(1, 2)))",
+    "np.sqrt(((z_E[:-1] - z) ** 2).sum(axis=2)).mean(axis=1)",
+)
+r1.mistake(
+    "You take the nearest single keypoint: one frame counts with all its keypoints.",
+    "np.sqrt(((z_E[:-1] - z) ** 2).sum(axis=(1, 2)))",
+    "np.sqrt(((z_E[:-1] - z) ** 2).sum(axis=2))",
+)
 r1.mistake(
     "You add up one distance per keypoint: the norm goes over all K keypoints and both coordinates at once.",
     "np.sqrt(((z_E[:-1] - z) ** 2).sum(axis=(1, 2)))",
@@ -48,10 +60,32 @@ r2.check(
     "a step of the demonstration, made elsewhere, earns 0",
     lambda rng: ((z := _walk(rng, 12))[4] + 3, z[5] + 3, z),
 )
+r2.check(
+    "so does its last step: q = N - 1 leads to the last frame",
+    lambda rng: ((z := _walk(rng, 12))[-2] + 3, z[-1] + 3, z),
+)
 r2.mistake("A step is z_{t+1} - z_t; yours has the opposite sign.", "z_next - z", "z - z_next")
 r2.mistake("A reward is larger when the step is nearer: Eq. 10 has a minus in front.", "-np.sqrt", "np.sqrt")
 r2.mistake("You compare places; Eq. 10 compares steps, z^E_{q+1} - z^E_q.", "z_E[1:] - z_E[:-1]", "z_E[:-1]")
 r2.mistake("Eq. 10 takes the nearest step, a minimum over q; you take the mean.", ".min()", ".mean()")
+r2.mistake(
+    "N frames have N - 1 steps: you leave out the last, q = N - 1, to the last frame.",
+    "z_E[1:] - z_E[:-1]",
+    "z_E[1:-1] - z_E[:-2]",
+)
+r2.mistake(
+    "q is not p: Eq. 10 takes the step most like the robot's, wherever it was made; you take the step at the "
+    "nearest frame.",
+    "z_E[1:] - z_E[:-1]",
+    "(z_E[1:] - z_E[:-1])[[((z_E[:-1] - z) ** 2).sum(axis=(1, 2)).argmin()]]",
+)
+r2.mistake(
+    "You return r_1 of z_next, a distance between places; Eq. 10 compares steps.",
+    "step = z_next - z",
+    "step = z_next",
+    "z_E[1:] - z_E[:-1]",
+    "z_E[:-1]",
+)
 
 
 @exercise("6.3", "What an episode earns (Eq. 8)", given=(r1, r2))
@@ -80,6 +114,14 @@ episode_return.mistake(
     "lambda_r1 weighs r1, lambda_r2 weighs r2; yours are swapped.", "lam1, lam2):", "lam2, lam1):"
 )
 episode_return.mistake(
+    "T frames have T - 1 transitions, and each earns one r_1; yours adds a T-th, that of the last frame.",
+    "return total",
+    "return total + lam1 * r1(z[-1], z_E)",
+)
+episode_return.mistake(
+    "Eq. 8 weighs the two parts: multiply r_1 by lam1 and r_2 by lam2.", "lam1 * ", "", "lam2 * ", ""
+)
+episode_return.mistake(
     "Rewards add up over an episode; you return their mean.", "return total", "return total / (len(z) - 1)"
 )
 
@@ -103,6 +145,11 @@ trim.check(
     "slow motion is kept where it adds up",
     lambda rng: (np.linspace(0, 1, 60)[:, None, None] * np.ones((1, 3, 2)), 0.2),
 )
+trim.check("where nothing rests, every frame stays, once", lambda rng: (_walk(rng, 10), 0.01))
+trim.check(
+    "a frame exactly `least` away stays",
+    lambda rng: (0.5 * np.arange(rng.integers(6, 12))[:, None, None] * np.array([[1.0, 0.0]]), 0.5),
+)
 trim.check("first and last frame stay", lambda rng: (np.zeros((8, 4, 2)), 0.1))
 trim.mistake(
     "Compare with the last frame you kept, not with the one before: slow motion would vanish as a whole.",
@@ -111,6 +158,25 @@ trim.mistake(
 )
 trim.mistake("The last frame is the goal: keep it always.", "kept + [len(z) - 1]", "kept")
 trim.mistake("You keep what rests and cut what moves.", ">= least", "< least")
+trim.mistake(
+    "Your last frame stands there twice: the rule has kept it already, and you add it once more.",
+    "range(1, len(z) - 1)",
+    "range(1, len(z))",
+)
+trim.mistake(
+    "At least `least` away: a distance of just `least` is enough, >= and not >.", ">= least", "> least"
+)
+trim.mistake(
+    "The distance is the length of all 2K numbers, as in Eq. 9; you take the farthest keypoint's.",
+    "np.linalg.norm(z[i] - z[kept[-1]])",
+    "np.linalg.norm(z[i] - z[kept[-1]], axis=1).max()",
+)
+trim.mistake("Compare with the last frame you kept; you compare with the first one.", "z[kept[-1]]", "z[0]")
+trim.mistake(
+    "The last frame is added to those you kept; yours takes its neighbour's place.",
+    "kept + [len(z) - 1]",
+    "kept[: max(1, len(kept) - 1)] + [len(z) - 1]",
+)
 
 
 @exercise("6.5", "A reward that knows the time")
@@ -122,7 +188,7 @@ def timed_r1(z_next, z_E, t):
 timed_r1.check("on the way", lambda rng: (rng.normal(size=(5, 2)), _walk(rng, 20), int(rng.integers(18))))
 timed_r1.check(
     "after the end the goal stays the goal",
-    lambda rng: (rng.normal(size=(5, 2)), _walk(rng, 20), int(rng.integers(19, 60))),
+    lambda rng: (rng.normal(size=(5, 2)), _walk(rng, 20), int(rng.integers(19, 37))),
 )
 timed_r1.mistake(
     "After step t the demonstration is at frame t + 1: the robot would always be a step late.",
@@ -133,6 +199,16 @@ timed_r1.mistake(
     "After its end the demonstration stays at its last frame; yours starts again.",
     "min(t + 1, len(z_E) - 1)",
     "(t + 1) % len(z_E)",
+)
+timed_r1.mistake(
+    "Frames count from 0, so the last is N - 1, the goal; yours stops one before.",
+    "min(t + 1, len(z_E) - 1)",
+    "min(t + 1, len(z_E) - 2)",
+)
+timed_r1.mistake(
+    "You add up one distance per keypoint: the distance is the length of all 2K numbers, as in Eq. 9.",
+    "np.linalg.norm(z_next - target)",
+    "np.linalg.norm(z_next - target, axis=1).sum()",
 )
 timed_r1.mistake(
     "A reward is larger when the robot is nearer: there is a minus in front.", "-np.linalg", "np.linalg"

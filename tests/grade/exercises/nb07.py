@@ -18,6 +18,11 @@ stopping.mistake(
     "v**2 / (2 * mu * g)",
     "v**2 / (mu * g)",
 )
+stopping.mistake(
+    "Python divides and multiplies from left to right: bracket what stands below the line.",
+    "v**2 / (2 * mu * g), v / (mu * g)",
+    "v**2 / 2 * mu * g, v / mu * g",
+)
 stopping.mistake("Friction slows by mu times g: gravity is missing.", "g = 9.81", "g = 1.0")
 stopping.mistake(
     "The energy goes with the square of the speed, and so does the distance.",
@@ -56,6 +61,16 @@ speeds.mistake(
     "max(low, 0)",
     "low",
 )
+speeds.mistake(
+    "Return the lowest speed first, then the highest.",
+    "np.sqrt(2 * mu * g * max(low, 0)), np.sqrt(2 * mu * g * high)",
+    "np.sqrt(2 * mu * g * high), np.sqrt(2 * mu * g * max(low, 0))",
+)
+speeds.mistake(
+    "The slack counts in full on either side: from distance - slack to distance + slack.",
+    "distance - slack, distance + slack",
+    "distance - slack / 2, distance + slack / 2",
+)
 speeds.mistake("Solve v^2 / (2 mu g) = distance for v: the square root is missing.", "np.sqrt", "float")
 speeds.mistake("Solve v^2 / (2 mu g) = distance for v: the 2 is missing.", "2 * mu", "mu")
 
@@ -66,8 +81,8 @@ def friction(x, dt):
     return -2 * np.polyfit(t, x, 2)[0] / 9.81
 
 
-def _track(rng, noise=0.0):
-    mu, v, dt = rng.uniform(0.05, 0.3), rng.uniform(0.8, 1.5), 0.04
+def _track(rng, noise=0.0, most=0.3):
+    mu, v, dt = rng.uniform(0.05, most), rng.uniform(0.8, 1.5), 0.04
     t = dt * np.arange(int(0.8 * v / (mu * 9.81) / dt) + 4)
     t = t[t < v / (mu * 9.81)]
     x = rng.uniform(0.4, 0.6) + v * t - mu * 9.81 * t**2 / 2
@@ -75,13 +90,33 @@ def _track(rng, noise=0.0):
 
 
 friction.check("a clean track", _track, rtol=1e-3)
-friction.check("a track with a millimetre of jitter", lambda rng: _track(rng, 1e-3), rtol=0.1, atol=0.01)
+friction.check(
+    "a track with two millimetres of jitter", lambda rng: _track(rng, 2e-3, most=0.1), rtol=1e-3, atol=1e-5
+)
 friction.mistake(
     "x = x0 + v t - (1/2) mu g t^2: the coefficient of t^2 is half the deceleration.", "-2 * np", "-np"
 )
 friction.mistake("The track bends down: the sign of your mu is wrong.", "-2 * np", "2 * np")
 friction.mistake(
     "Frames are dt apart: you fitted over frame numbers, not over seconds.", "dt * np.arange", "np.arange"
+)
+friction.mistake(
+    "np.polyfit returns the highest power first: that of t^2 is [0].", "t, x, 2)[0]", "t, x, 2)[2]"
+)
+friction.mistake(
+    "T frames have T - 1 steps of dt between them: the last is at (T - 1) * dt. np.arange counts right.",
+    "dt * np.arange(len(x))",
+    "np.linspace(0, len(x) * dt, len(x))",
+)
+friction.mistake(
+    "Second differences add up the jitter of single frames: fit a parabola to the whole track.",
+    "-2 * np.polyfit(t, x, 2)[0]",
+    "-np.diff(x, 2).mean() / dt**2",
+)
+friction.mistake(
+    "A line through the speeds has the jitter of two frames in each: fit a parabola to the places.",
+    "-2 * np.polyfit(t, x, 2)[0]",
+    "-np.polyfit(t[:-1], np.diff(x) / dt, 1)[0]",
 )
 friction.mistake("What you return is a deceleration in m/s^2: divide by g.", "[0] / 9.81", "[0]")
 
@@ -105,11 +140,23 @@ solved.check(
 )
 solved.check(
     "one that slides across the target and on",
-    lambda rng: (0.5 + rng.uniform(0.3, 0.5) * 0.04 * np.arange(60), 0.94, 0.04),
+    lambda rng: (0.5 + rng.uniform(0.6, 0.9) * 0.04 * np.arange(30), 0.94, 0.04),
 )
 solved.check(
-    "one that is at rest early and hit away later",
-    lambda rng: (np.concatenate([np.full(8, 0.53), np.linspace(0.53, 1.3, 30)]), 0.94, 0.04),
+    "one that slides across and back",
+    lambda rng: (1.2 - rng.uniform(0.6, 0.9) * 0.04 * np.abs(np.arange(-20, 21)), 0.94, 0.04),
+)
+solved.check(
+    "one that rests at the target and is hit away",
+    lambda rng: (
+        np.concatenate([np.full(8, x := 0.94 + rng.uniform(-0.04, 0.04)), np.linspace(x, 1.4, 30)]),
+        0.94,
+        0.04,
+    ),
+)
+solved.check(
+    "one that creeps in at 1 cm/s, and out on the other side",
+    lambda rng: (0.88 + rng.uniform(0, 0.01) + 0.01 * 0.04 * np.arange(320), 0.94, 0.04),
 )
 solved.mistake("A step is dt seconds: divide the way by it to get a speed in m/s.", " / dt", "")
 solved.mistake(
@@ -126,4 +173,24 @@ solved.mistake(
     "A distance has no sign: a puck far short of the target counts as near in yours.",
     "np.abs(x[1:] - target)",
     "(x[1:] - target)",
+)
+solved.mistake(
+    "A speed has no sign here: a puck that slides backward counts as slow in yours.",
+    "np.abs(np.diff(x))",
+    "np.diff(x)",
+)
+solved.mistake(
+    "The place counts at the step's end, x[t + 1]; yours is where the step began.",
+    "np.abs(x[1:] - target)",
+    "np.abs(x[:-1] - target)",
+)
+solved.mistake(
+    "Each step is judged by itself: a puck that is hit away is no longer at the target.",
+    "return (np.abs(x[1:] - target) < 0.05) & (speed < 0.02)",
+    "return np.logical_or.accumulate((np.abs(x[1:] - target) < 0.05) & (speed < 0.02))",
+)
+solved.mistake(
+    "np.gradient takes the mean of two steps; the speed is that of one, |x[t + 1] - x[t]| / dt.",
+    "np.abs(np.diff(x)) / dt",
+    "np.abs(np.gradient(x, dt))[1:]",
 )

@@ -40,7 +40,24 @@ foreground.mistake(
 foreground.mistake(
     "What is darker than the background stands out, too: take the absolute difference.", "np.abs(", "("
 )
-foreground.mistake("One truth value a pixel: take the mean over the three colours first.", ".mean(-1)", "")
+foreground.mistake(
+    "One truth value a pixel: take the mean of the three colours' absolute differences.", ".mean(-1)", ""
+)
+foreground.mistake(
+    "Differences of opposite sign must not cancel: the absolute value first, then the mean over the colours.",
+    "np.abs(video - np.median(video, axis=0)).mean(-1)",
+    "np.abs((video - np.median(video, axis=0)).mean(-1))",
+)
+foreground.mistake(
+    "The mean over the three colours decides, not one colour alone.",
+    ".mean(-1) > threshold",
+    ".max(-1) > threshold",
+)
+foreground.mistake(
+    "The median is a picture, one value for each pixel and colour: give np.median the axis of time, 0.",
+    "np.median(video, axis=0)",
+    "np.median(video)",
+)
 
 
 @exercise("8.3", "Where the motion is")
@@ -73,7 +90,26 @@ share_inside.mistake("That is the share outside: the mask is True inside.", "ene
 share_inside.mistake(
     "Divide by all the motion, not by the number of pixels.", "/ energy.sum()", "/ energy.size"
 )
-share_inside.mistake("Energy is the square of the difference.", ") ** 2)", "))")
+share_inside.mistake(
+    "Energy is the square of the difference, not its size.",
+    "(np.diff(video.astype(float), axis=0) ** 2)",
+    "np.abs(np.diff(video.astype(float), axis=0))",
+)
+share_inside.mistake(
+    "Differences with their signs cancel over time: square them.",
+    "(np.diff(video.astype(float), axis=0) ** 2)",
+    "np.diff(video.astype(float), axis=0)",
+)
+share_inside.mistake(
+    "A share of the whole: divide sums, not means, which forget how large the mask is.",
+    "energy[mask].sum() / energy.sum()",
+    "energy[mask].mean() / energy.mean()",
+)
+share_inside.mistake(
+    "A share of the whole: divide by all the motion, not by that outside.",
+    "/ energy.sum()",
+    "/ max(energy[~mask].sum(), 1e-9)",
+)
 
 
 @exercise("8.1", "Slide or tip")
@@ -113,6 +149,11 @@ disturbance.check("two equal ones", lambda rng: ((z := _pair(rng)[0]), z.copy(),
 disturbance.mistake(
     "From -1 to 1 are 2 units over `size` pixels: half of size for each.", "* size / 2", "* size"
 )
+disturbance.mistake(
+    "-1 and 1 are the edges of the picture, `size` pixels apart, not the centres of its outer pixels.",
+    "* size / 2",
+    "* (size - 1) / 2",
+)
 disturbance.mistake("One number a keypoint: the mean goes over frames only.", ".mean(0)", ".mean()")
 disturbance.mistake(
     "A shift to the left and one to the right do not cancel: take each frame's distance first.",
@@ -123,4 +164,9 @@ disturbance.mistake(
     "x and y belong together: the distance is the norm over both.",
     "np.linalg.norm(z_a - z_b, axis=-1)",
     "np.abs(z_a - z_b).sum(-1)",
+)
+disturbance.mistake(
+    "One distance for x and y together: the norm over both, not their mean.",
+    "np.linalg.norm(z_a - z_b, axis=-1)",
+    "np.abs(z_a - z_b).mean(-1)",
 )

@@ -14,19 +14,26 @@ from tests.grade.exercise import exercise
     import pybullet as p
 
     def probe(force, friction, seconds):
+        other = p.connect(p.DIRECT)  # a call without physicsClientId=client goes there
         client = p.connect(p.DIRECT)
         try:
             p.setTimeStep(1 / 250, client)
             body = make_drawer(client, friction)
+            mass = p.getDynamicsInfo(body, 0, client)[0]
+            low, high = p.getAABB(body, 0, client)
+            parts = len(p.getCollisionShapeData(body, -1, client))
             q = []
-            for step in range(int(250 * seconds)):
+            for step in range(int(250 * seconds) + 75):  # then it is let go for 0.3 s
                 if step % 25 == 0:
                     q.append(p.getJointState(body, 0, client)[0])
-                p.applyExternalForce(body, 0, (force, 0, 0), (0, 0, 0), p.LINK_FRAME, client)
+                if step < 250 * seconds:
+                    p.applyExternalForce(body, 0, (force, 0, 0), (0, 0, 0), p.LINK_FRAME, client)
                 p.stepSimulation(client)
-            return np.array(q)
+            size = [b - a for a, b in zip(low, high)]
+            return {"joint": np.array(q), "mass": mass, "size": np.array(size), "shapes of the base": parts}
         finally:
             p.disconnect(client)
+            p.disconnect(other)
     """,
 )
 def make_drawer(client, friction):
@@ -53,22 +60,37 @@ def make_drawer(client, friction):
     return body
 
 
+def _push(rng, least, most, seconds):
+    friction = float(rng.uniform(12, 24))
+    return friction + float(rng.uniform(least, most)), friction, seconds
+
+
 make_drawer.check(
-    "a push below the friction does not move it",
-    lambda rng: (float(rng.uniform(5, 15)), 18.0, 0.5),
-    atol=1e-3,
+    "a push below the friction does not move it", lambda rng: _push(rng, -10, -2, 0.5), atol=1e-3
 )
-make_drawer.check("a push above it does", lambda rng: (float(rng.uniform(19, 22)), 18.0, 0.3), atol=2e-3)
-make_drawer.check("it stops where it is shut", lambda rng: (40.0, 18.0, 1.0), atol=5e-3)
+make_drawer.check(
+    "a push above it does, and nothing else brakes", lambda rng: _push(rng, 0.8, 2, 0.36), atol=2e-4
+)
+make_drawer.check("it stops where it is shut", lambda rng: _push(rng, 15, 25, 1.0), atol=5e-3)
 make_drawer.mistake(
     "It gives way to any push: dry friction is a velocity motor that wants 0 and has at most that force.",
     "force=friction",
     "force=0",
 )
+make_drawer.mistake("The friction is the argument, not always 18 N.", "force=friction", "force=18")
 make_drawer.mistake(
-    "It slides along another axis than x: see linkJointAxis.",
+    "It does not give way along x: is the joint's axis (1, 0, 0), and Bullet's own motor replaced by yours "
+    "(setJointMotorControl2)?",
     "linkJointAxis=[(1, 0, 0)]",
     "linkJointAxis=[(0, 1, 0)]",
+)
+make_drawer.mistake(
+    "It turns instead of sliding: the joint is prismatic.", "p.JOINT_PRISMATIC", "p.JOINT_REVOLUTE"
+)
+make_drawer.mistake(
+    "A motor that wants a position pulls the drawer back: friction wants velocity 0, VELOCITY_CONTROL.",
+    "p.VELOCITY_CONTROL, targetVelocity=0",
+    "p.POSITION_CONTROL, targetPosition=-0.15",
 )
 make_drawer.mistake(
     "It starts shut: reset the joint to -0.15, open.",
@@ -76,29 +98,60 @@ make_drawer.mistake(
     "resetJointState(body, 0, 0.0",
 )
 make_drawer.mistake(
-    "It slides on through the cabinet: set the joint's limits to -0.15 and 0.",
+    "It slides on through the cabinet: set the joint's limits to -0.15 and 0, with jointDamping=0 in the "
+    "same call of changeDynamics (without it PyBullet forgets the limits).",
     "jointLowerLimit=-0.15",
     "jointLowerLimit=-9",
     "jointUpperLimit=0",
     "jointUpperLimit=9",
 )
+make_drawer.mistake(
+    "Something else brakes it: Bullet damps links and joints by default; linearDamping=0 and jointDamping=0.",
+    "        linearDamping=0,\n        jointDamping=0,\n",
+    "",
+)
+make_drawer.mistake(
+    "halfExtents are half the lengths: (0.05, 0.08, 0.04), not twice that.",
+    "halfExtents=(0.05, 0.08, 0.04)",
+    "halfExtents=(0.1, 0.16, 0.08)",
+)
+make_drawer.mistake(
+    "The base has no shape of its own: it would stand in the drawer's way.",
+    "baseMass=0, ",
+    "baseMass=0, baseCollisionShapeIndex=shape, ",
+)
+make_drawer.mistake(
+    "Your calls go to another world than the one you were given: physicsClientId=client in every one.",
+    "physicsClientId=client",
+    "physicsClientId=client - 1",
+)
 
 
 @exercise("9.2", "What the policy sees")
-def observe(z, z_before, target, clock):
-    return np.concatenate([z.ravel(), (z - z_before).ravel(), (target - z).ravel(), [clock]])
+def observe(recent, target, clock):
+    z_2, z_1, z = recent
+    steps = (z - z_1).ravel(), (z_1 - z_2).ravel()
+    return np.concatenate([z.ravel(), *steps, (target - z).ravel(), [clock]])
 
 
 def _seen(rng, K=5):
-    return *(rng.normal(size=(K, 2)) for _ in range(3)), float(rng.uniform())
+    return rng.normal(size=(3, K, 2)), rng.normal(size=(K, 2)), float(rng.uniform())
 
 
 observe.check("five keypoints", _seen)
 observe.check("any number of them", lambda rng: _seen(rng, 3))
 observe.mistake(
     "How the keypoints moved is z_t - z_{t-1}; yours has the opposite sign.",
-    "(z - z_before)",
-    "(z_before - z)",
+    "(z - z_1).ravel(), (z_1 - z_2).ravel()",
+    "(z_1 - z).ravel(), (z_2 - z_1).ravel()",
+)
+observe.mistake(
+    "The last of `recent` is the newest: z_t is recent[2].", "z_2, z_1, z = recent", "z, z_1, z_2 = recent"
+)
+observe.mistake(
+    "The second step is the one before, z_{t-1} - z_{t-2}; yours reaches from t-2 to t.",
+    "(z_1 - z_2)",
+    "(z - z_2)",
 )
 observe.mistake(
     "The way ahead leads from the robot to the demonstration: target minus z.", "(target - z)", "(z - target)"
@@ -107,6 +160,16 @@ observe.mistake(
     "Give the way to the demonstration, not its place: or the policy has to learn the video by heart.",
     "(target - z)",
     "target",
+)
+observe.mistake(
+    "The clock comes last.",
+    "[z.ravel(), *steps, (target - z).ravel(), [clock]]",
+    "[[clock], z.ravel(), *steps, (target - z).ravel()]",
+)
+observe.mistake(
+    "Flatten each array whole, x and y of keypoint 1 first; yours mixes the arrays keypoint by keypoint.",
+    "return np.concatenate([z.ravel(), *steps, (target - z).ravel(), [clock]])",
+    "return np.append(np.stack([z, z - z_1, z_1 - z_2, target - z], 1).ravel(), clock)",
 )
 observe.mistake("The clock is missing: the same z earns differently at different times.", ", [clock]", "")
 
@@ -156,6 +219,11 @@ learn_by_watching.mistake(
     "You look for keypoints on the human's frames; the detector knows robots: translate first.",
     "detect(translate(demo))",
     "detect(demo)",
+)
+learn_by_watching.mistake(
+    "Translation is for frames, not for keypoints: translate first, then detect.",
+    "detect(translate(demo))",
+    "translate(detect(demo))",
 )
 learn_by_watching.mistake(
     "The robot's own frames need no translation.", "detect(robot)", "detect(translate(robot))"
@@ -208,6 +276,12 @@ evaluate.mistake(
     "any(play(1_000_000 + i))",
     "sum(play(1_000_000 + i))",
 )
+evaluate.mistake(
+    "Return how many were solved, not their share.",
+    "sum(any(play(1_000_000 + i)) for i in range(n))",
+    "sum(any(play(1_000_000 + i)) for i in range(n)) / n",
+)
+evaluate.mistake("Solved at any step, not at all of them.", "any(play", "all(play")
 evaluate.mistake(
     "Those seeds belong to the training; test episodes start at 1,000,000.", "1_000_000 + i", "i"
 )

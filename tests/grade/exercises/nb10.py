@@ -34,6 +34,16 @@ wilson.mistake(
     "The root holds p (1 - p) / n and z^2 / (4 n^2): the second one has n squared.", "(4 * n**2)", "(4 * n)"
 )
 wilson.mistake("Both centre and half width are divided by 1 + z^2 / n.", " / (1 + z**2 / n)", "")
+wilson.mistake(
+    "Under the root and in the centre, n stands below the line: z**2 / (2 * n), with brackets.",
+    "z**2 / (2 * n)",
+    "z**2 / 2 * n",
+)
+wilson.mistake(
+    "Probabilities go from 0 to 1; yours are per cent.",
+    "max(0.0, centre - half), min(1.0, centre + half)",
+    "100 * max(0.0, centre - half), 100 * min(1.0, centre + half)",
+)
 wilson.mistake("95 % lie within 1.96 standard deviations, not within 1.", "z = 1.96", "z = 1.0")
 wilson.mistake(
     "You return centre and half width; return the two ends.",
@@ -60,6 +70,14 @@ chance.mistake(
     "At least k means all counts from k to n; yours is exactly k.", "range(k, n + 1)", "range(k, k + 1)"
 )
 chance.mistake("n of n belongs to it: range stops one before its end.", "range(k, n + 1)", "range(k, n)")
+chance.mistake(
+    "You sum up to k, at most k wins; at least k goes from k to n.", "range(k, n + 1)", "range(0, k + 1)"
+)
+chance.mistake(
+    "The number of ways belongs to each count i of the sum: math.comb(n, i), not of k.",
+    "comb(n, i)",
+    "comb(n, k)",
+)
 chance.mistake(
     "k wins can fall on many sets of episodes: count them with math.comb.", "math.comb(n, i) * ", ""
 )
@@ -93,6 +111,17 @@ difference.mistake(
     "A draw is the mean over its seeds: one number a row of the picks.", ".mean(1)", ".mean(0)"
 )
 difference.mistake(
+    "Each draw has a difference of its own; take quantiles of these, not differences of quantiles.",
+    "float(np.quantile(means, 0.025)), float(np.quantile(means, 0.975))",
+    "tuple(float(np.quantile(a[picks_a].mean(1), q) - np.quantile(b[picks_b].mean(1), q)) "
+    "for q in (0.025, 0.975))",
+)
+difference.mistake(
+    "You take quantiles over single seeds: a draw is the mean over its seeds.",
+    "a[picks_a].mean(1) - b[picks_b].mean(1)",
+    "a[picks_a] - b[picks_b]",
+)
+difference.mistake(
     "You subtract the wrong way round: a - b.",
     "a[picks_a].mean(1) - b[picks_b].mean(1)",
     "b[picks_b].mean(1) - a[picks_a].mean(1)",
@@ -111,10 +140,11 @@ def verdict(idle, random, expert):
 
 
 def _task(rng, idle=0.0, random=0.02, expert=1.0):
-    return rng.random(20) < idle, np.arange(100) < round(100 * random), rng.random(20) < expert
+    n = int(rng.choice([40, 100, 300]))
+    return rng.random(20) < idle, np.arange(n) < int(n * random), rng.random(20) < expert
 
 
-verdict.check("a fair task", lambda rng: _task(rng, random=rng.integers(0, 6) / 100))
+verdict.check("a fair task", lambda rng: _task(rng, random=rng.uniform(0, 0.05)))
 verdict.check(
     "one that idling solves now and then",
     lambda rng: ((t := _task(rng, 0.0))[0] | (np.arange(20) == 7), t[1], t[2]),
@@ -122,8 +152,8 @@ verdict.check(
 verdict.check("one that chance solves", lambda rng: _task(rng, random=rng.uniform(0.06, 0.5)))
 verdict.check("one with an expert that fails", lambda rng: (*_task(rng)[:2], np.arange(20) != 3))
 verdict.check(
-    "both idling and chance solve it: name the first",
-    lambda rng: (np.ones(20, bool), np.arange(100) < 30, np.ones(20, bool)),
+    "two or three of them at once: name the first",
+    lambda rng: (np.ones(20, bool) * bool(k := rng.integers(2)), np.arange(100) < 30, np.arange(20) < 20 * k),
 )
 verdict.mistake(
     "Once is enough: a task that idling solves in one episode is not fair.", "idle.any()", "idle.all()"
@@ -135,6 +165,16 @@ verdict.mistake(
 )
 verdict.mistake(
     "The expert has to solve every episode; you are content with one.", "not expert.all()", "not expert.any()"
+)
+verdict.mistake(
+    "Compare the share of the random episodes with 0.05, not their number with 5: there may be any number.",
+    "random.mean() > 0.05",
+    "random.sum() > 5",
+)
+verdict.mistake(
+    "The expert comes last: where doing nothing or chance solves the task, that is what to say.",
+    "if idle.any():",
+    "if not expert.all():\n        return 'not even the expert solves it'\n    if idle.any():",
 )
 verdict.mistake(
     "Ask for idling first: where it solves the task, chance does as well.",
