@@ -13,6 +13,7 @@ import numpy as np
 
 from .training import InputError
 
+LAMBDA = (1.0, 3.0)  # of r1 and r2; the paper names none. With 1, 1 slide's pucks scatter twice as far
 LEAST_STEP = 0.1  # of the robot's step: what moves less from frame to frame rests
 REST = 5  # frames of a rest that stay, 0.2 s: movements start and end slowly; without them the robot is
 # always late, and hits a sliding puck too hard to catch up
@@ -96,7 +97,7 @@ class KeypointReward:
         *,
         form: str = "mended",
         horizon: int | None = None,
-        lam: tuple[float, float] = (1.0, 1.0),
+        lam: tuple[float, float] = LAMBDA,
         trim: bool = True,
         speed: bool = True,
         include_goal: bool = True,

@@ -251,7 +251,7 @@ def train(
     checkpoint: Checkpoint | None = None,
     evaluate=None,
     evaluate_every: int = 10,
-    updates: int = 2,
+    updates: int = 4,
     random_steps: int = 500,
     batch: int = 128,
     **recipe,

@@ -1,16 +1,20 @@
 """The course is made from the notebooks in this folder.
 
 `python -m solutions release` writes the student version to `notebooks/`, by nbgrader's own preprocessors.
-`python -m solutions book` executes the solutions and writes them as web pages to `runs/book/`.
+`python -m solutions book` executes the solutions and writes them as web pages to `runs/book/`, which need no
+network: equations are MathML, pictures and scenes are in the pages.
 """
 
 from __future__ import annotations
 
 import argparse
+import re
 import sys
+from html import escape
 from pathlib import Path
 
 import nbformat
+from latex2mathml.converter import convert
 from nbclient.exceptions import CellExecutionError
 from nbconvert import HTMLExporter, NotebookExporter
 from nbconvert.preprocessors import ExecutePreprocessor
@@ -32,6 +36,28 @@ ROOT = HERE.parent
 NOTEBOOKS = ROOT / "notebooks"
 BOOK = ROOT / "runs" / "book"
 TIMEOUT = 1800  # s, for one cell
+STYLE = """
+body { margin: 0 auto !important; max-width: 62rem; padding: 0 1rem 4rem }
+nav { position: sticky; top: 0; z-index: 9; display: flex; gap: 1.5rem; padding: .6rem 1rem; background: #fff;
+  border-bottom: 1px solid #ddd; font: 15px system-ui, sans-serif }
+nav label { margin-left: auto }
+body:has(#plain:checked) .jp-InputArea:has(.jp-CodeMirrorEditor) { display: none }
+body:has(#plain:checked) .jp-InputPrompt, body:has(#plain:checked) .jp-OutputPrompt { visibility: hidden }
+math[display=block] { margin: .8em 0 }
+img { max-width: 100% }
+@media print {
+  nav, iframe { display: none }
+  .jp-Cell, figure, img { break-inside: avoid }
+}
+"""
+INDEX = """
+body { font: 17px/1.5 system-ui, sans-serif; max-width: 46rem; margin: 3rem auto;
+  padding: 0 1rem; color: #222 }
+li { margin: .7rem 0; list-style: none } ul { padding: 0 } a { color: #0072b2; font-weight: 600 }
+p { margin: .1rem 0 }
+"""
+MATH = re.compile(r"(`+.*?`+)|\$\$(.+?)\$\$|\$([^$\n]+?)\$", re.DOTALL)
+GREETING = re.compile(r"(pybullet build time: .*|argv\[0\]=)\n?")  # PyBullet's, to everybody who imports it
 
 
 def sources() -> list[Path]:
@@ -63,10 +89,64 @@ def execute(source: Path) -> nbformat.NotebookNode:
     return notebook
 
 
+def mathml(text: str) -> str:
+    """Text with its equations as MathML, which browsers show without a script from the network."""
+    return MATH.sub(lambda m: m[1] or convert(m[2] or m[3], display="block" if m[2] else "inline"), text)
+
+
+def title(source: Path) -> str:
+    """The notebook's first line."""
+    return nbformat.read(source, as_version=4).cells[0].source.splitlines()[0].lstrip("# ")
+
+
+def page(notebook: nbformat.NotebookNode, source: Path) -> str:
+    """An executed notebook as a web page that needs nothing else, with links to its neighbours."""
+    equations = []
+
+    def keep(found):  # the exporter would take MathML apart
+        equations.append(mathml(found[0]))
+        return f"EQUATION{len(equations) - 1}HERE"
+
+    for cell in notebook.cells:
+        if cell.cell_type == "markdown":
+            cell.source = MATH.sub(lambda m: m[0] if m[1] else keep(m), cell.source)
+        for output in list(cell.get("outputs", [])):
+            if GREETING.fullmatch(output.get("text", "")):
+                cell.outputs.remove(output)
+    exporter = HTMLExporter(embed_images=True, mathjax_url="", require_js_url="")
+    exporter.exclude_anchor_links = True
+    html, _ = exporter.from_notebook_node(notebook, {"metadata": {"name": escape(title(source))}})
+    html = re.sub(r'<script type="module">.*?</script>', "", html, flags=re.DOTALL)  # mermaid, from a network
+    html = re.sub(r"EQUATION(\d+)HERE", lambda m: equations[int(m[1])], html)
+    order = sources()
+    i = order.index(source)
+    links = ['<a href="index.html">contents</a>']
+    links += [
+        f'<a href="{order[j].stem}.html">{title(order[j])}</a>' for j in (i - 1, i + 1) if 0 <= j < len(order)
+    ]
+    bar = f'<nav>{"".join(links)}<label><input type="checkbox" id="plain"> hide the code</label></nav>'
+    html = html.replace("</head>", f"<style>{STYLE}</style></head>", 1)
+    return re.sub(r"(<body[^>]*>)", lambda found: found[1] + bar, html, count=1)
+
+
+def contents() -> str:
+    """The page that lists all notebooks with their questions."""
+    rows = []
+    for source in sources():
+        question = nbformat.read(source, as_version=4).cells[0].source.split("**The question.**")[1]
+        question = mathml(question.split("\n\n")[0].strip().replace("*", ""))
+        rows.append(f'<li><a href="{source.stem}.html">{title(source)}</a><p>{question}</p></li>')
+    return (
+        f'<!doctype html><html lang="en"><meta charset="utf-8"><title>LbW minimal, the course</title>'
+        f"<style>{INDEX}</style><h1>LbW minimal, the course</h1><ul>{''.join(rows)}</ul></html>\n"
+    )
+
+
 def book(only: list[str]) -> int:
     """Execute and write the pages; returns how many notebooks failed."""
     BOOK.mkdir(parents=True, exist_ok=True)
-    failed, rows = 0, []
+    failed = 0
+    write_atomic(BOOK / "index.html", contents())
     for source in sources():
         if only and source.stem[:2] not in only:
             continue
@@ -77,14 +157,7 @@ def book(only: list[str]) -> int:
             print(f"{source.stem}: {e}", file=sys.stderr)
             failed += 1
             continue
-        html, _ = HTMLExporter(embed_images=True).from_notebook_node(notebook)
-        write_atomic(BOOK / f"{source.stem}.html", html)
-        title = notebook.cells[0].source.splitlines()[0].lstrip("# ")
-        rows.append(f'<li><a href="{source.stem}.html">{title}</a></li>')
-    page = '<!doctype html><html lang="en"><meta charset="utf-8"><title>LbW minimal</title>'
-    write_atomic(
-        BOOK / "index.html", f"{page}<h1>LbW minimal, the course</h1><ul>{''.join(rows)}</ul></html>\n"
-    )
+        write_atomic(BOOK / f"{source.stem}.html", page(notebook, source))
     return failed
 
 

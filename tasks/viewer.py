@@ -15,6 +15,7 @@ from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
 
+import cv2
 import meshcat
 import numpy as np
 import pybullet as p
@@ -155,6 +156,7 @@ class Recorder:
 
     def __init__(self, client: int, bodies=None):
         self.client, self.eye, self.target = client, EYE, TARGET  # m: where one looks from, and at
+        self.world = None  # of a task's environment, whose scenery is shown for a picture only
         self.frames = []  # an array (L, 7) each: position in m and quaternion (x, y, z, w) of every link
         self.shapes = []  # (link's row, geometry, 4x4 place in the link's frame, rgba)
         self.links = []  # (body, link) with something to draw; the base is link -1
@@ -231,10 +233,35 @@ class Recorder:
             target=y_up(self.target),
         )
 
+    def picture(self) -> bytes:
+        """The scene as it is now, seen as the page shows it first: a PNG of 640 x 360 pixels."""
+        size = 640, 360
+        view = p.computeViewMatrix(self.eye, self.target, (0, 0, 1))
+        lens = p.computeProjectionMatrixFOV(FOV, size[0] / size[1], 0.1, 5.0)
+        if self.world:
+            self.world.show_scenery(True)
+        options = {"renderer": p.ER_TINY_RENDERER, "physicsClientId": self.client}
+        rgba = p.getCameraImage(*size, view, lens, lightDirection=(0.3, -1, 1.6), **options)[2]
+        if self.world:
+            self.world.show_scenery(False)
+        rgb = np.reshape(np.uint8(rgba), (size[1], size[0], 4))[..., 2::-1]  # OpenCV writes blue first
+        return cv2.imencode(".png", rgb)[1].tobytes()
+
     def _repr_html_(self) -> str:
-        """In a notebook a recorder as a cell's value shows itself, in a frame of its own."""
+        """In a notebook a recorder as a cell's value shows itself, in a frame of its own.
+
+        Paper, and viewers that take scripts out, show a picture instead.
+        """
         page = html.escape(self.html("scene"))
-        return f'<iframe srcdoc="{page}" style="width: 100%; height: 420px; border: 0"></iframe>'
+        scene = f'<iframe srcdoc="{page}" style="width: 100%; height: 420px; border: 0"></iframe>'
+        if not p.isConnected(self.client):
+            return scene
+        png = f"data:image/png;base64,{base64.b64encode(self.picture()).decode()}"
+        nothing = "data:image/gif;base64,R0lGODlhAQABAAAAACH5BAEKAAEALAAAAAABAAEAAAICTAEAOw=="  # 1 x 1, clear
+        return (
+            f'{scene}<picture><source media="not print" srcset="{nothing}">'
+            f'<img alt="the scene" src="{png}"></picture>'
+        )
 
     def save(self, path: Path | str, title: str = "PyBullet scene", **options) -> None:
         """Write `html(title, **options)` to a file, whole or not at all."""
@@ -245,6 +272,7 @@ def mirror(env) -> Recorder:
     """A recorder of a task's environment, scenery included, that frames what its camera does and the arm."""
     env.world.show_scenery(True)
     recorder = Recorder(env.world.client)
+    recorder.world = env.world
     env.world.show_scenery(False)
     wider = env.CAMERA[1] / TaskEnv.CAMERA[1]
     aside = np.array([env.CAMERA[0][0] - TaskEnv.CAMERA[0][0], 0, 0])
