@@ -28,7 +28,7 @@ E61 = find("6.1")
 REST = sum(find(f"6.{i}").points for i in (2, 3, 4, 5))
 RIGHT = E61.source
 COUNTING = RIGHT.replace("    return", "    global calls\n    calls += 1\n    return")
-# What 6.1 is answered with, and how many of its 3 points that is worth.
+# What 6.1 is answered with, and how many points that is worth.
 BAD = {
     "endless loop": ("def r1(z, z_E):\n    while True:\n        pass", 0),
     "sleep": ("import time\ndef r1(z, z_E):\n    time.sleep(10_000)", 0),
@@ -36,11 +36,11 @@ BAD = {
     "fork bomb, quiet": (
         "import os\nfor _ in range(10_000):\n    try:\n        os.fork()\n"
         "    except OSError:\n        pass\n" + RIGHT,
-        3,
+        E61.points,
     ),
     "100 GB": ("def r1(z, z_E):\n    return np.ones(100 << 27).sum()", 0),
     "a gigabyte printed": (
-        "import sys\nfor _ in range(1 << 10):\n    sys.stdout.write('x' * (1 << 20))\n" + RIGHT, 3,
+        "import sys\nfor _ in range(1 << 10):\n    sys.stdout.write('x' * (1 << 20))\n" + RIGHT, E61.points,
     ),
     "a full disk": ("def r1(z, z_E):\n    open('/tmp/x', 'wb').write(b'0' * (1 << 34))", 0),
     "os._exit(0)": ("import os\ndef r1(z, z_E):\n    os._exit(0)", 0),
@@ -50,7 +50,7 @@ BAD = {
     "kills everybody, quietly": (
         "import os\nfor pid in {os.getppid(), 0, -1, *range(2, 400)} - {os.getpid()}:\n"
         "    try:\n        os.kill(pid, 9)\n    except OSError:\n        pass\n" + RIGHT,
-        3,
+        E61.points,
     ),
     "ignores signals": (
         "import signal\nfor s in (2, 3, 14, 15, 24):\n    signal.signal(s, signal.SIG_IGN)\n"
@@ -106,7 +106,8 @@ BAD = {
     "a list that holds itself": ("def r1(z, z_E):\n    x = []\n    x.append(x)\n    return x", 0),
     "no Python": ("this is not Python", 0),
     "a thread that stays": (
-        "import threading, time\nthreading.Thread(target=time.sleep, args=(10_000,)).start()\n" + RIGHT, 3,
+        "import threading, time\nthreading.Thread(target=time.sleep, args=(10_000,)).start()\n" + RIGHT,
+        E61.points,
     ),
 }  # fmt: skip
 
@@ -299,7 +300,7 @@ def test_junit_and_gradescope_hold_the_same_points(class_of_odd_files):
     failed = {s.get("name"): int(s.get("failures")) for s in suites}
     assert failed["another kernel"] == 0 and failed["a cell deleted"] == 1 and failed["invalid JSON"] == 5
     tests = json.loads((out / safe("a cell deleted") / "results.json").read_text())["tests"]
-    assert [(t["name"][:3], t["score"]) for t in tests][:2] == [("6.1", 0), ("6.2", 2)]
+    assert [(t["name"][:3], t["score"]) for t in tests][:2] == [("6.1", 0), ("6.2", find("6.2").points)]
     assert sum(t["max_score"] for t in tests) == FULL
 
 
