@@ -9,7 +9,7 @@ import sys
 import nbformat
 import pytest
 
-from solutions.__main__ import NOTEBOOKS, ROOT, sources, student
+from solutions.__main__ import MATH, NOTEBOOKS, ROOT, contents, page, sources, student
 from tests.grade.__main__ import grade, main
 from tests.grade.exercise import everything
 from tests.grade.notebook import StillOpen
@@ -132,3 +132,23 @@ def test_by_default_the_notebooks_that_were_handed_in_are_graded(tmp_path, capsy
     (tmp_path / "class" / "ann" / "n.ipynb").write_text((NOTEBOOKS / SOURCES[6].name).read_text())
     assert main([str(tmp_path / "class"), "--out", str(tmp_path / "out")]) == 0
     assert f"ann: 0 of {sum(e.points for e in of(SOURCES[6])):g}" in capsys.readouterr().out
+
+
+def test_a_page_of_the_book_needs_no_network_and_no_script_for_its_equations():
+    source = SOURCES[1]
+    notebook = nbformat.read(source, as_version=4)
+    notebook.cells = [c for c in notebook.cells if c.cell_type == "markdown"]
+    stream = nbformat.v4.new_output("stream", text="pybullet build time: Jan 29 2025\n")
+    notebook.cells.append(nbformat.v4.new_code_cell("import pybullet", outputs=[stream]))
+    equations = sum(not m[1] for c in notebook.cells for m in MATH.finditer(c.source))
+    html = page(notebook, source)
+    assert not re.search(r"(?:src|href)=.https?://[^>]*(?:\.js|\.css|cdn)", html)
+    assert html.count("<math") == equations > 10
+    assert "EQUATION" not in html and "build time" not in html
+    assert all(f'href="{name}.html"' in html for name in ("index", SOURCES[0].stem, SOURCES[2].stem))
+    assert 'id="plain"' in html
+
+
+def test_the_books_contents_ask_every_notebooks_question():
+    html = contents()
+    assert html.count("<li>") == len(SOURCES) and html.count("?") >= len(SOURCES)

@@ -7,6 +7,7 @@ import time
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pybullet as p
 import pybullet_data
@@ -280,6 +281,22 @@ def test_a_pages_ids_tell_nothing_of_the_computer(client):
     primitives(client)
     page = Recorder(client).html("x")
     assert page == Recorder(client).html("x")
+
+
+def test_on_paper_a_notebook_shows_a_picture_of_the_scene():
+    client = p.connect(p.DIRECT)
+    primitives(client)
+    recorder = Recorder(client)
+    recorder.target = 0.2, 0.1, 0.8
+    shown = recorder._repr_html_()
+    (png,) = re.findall(r'<img [^>]*src="data:image/png;base64,([^"]+)"', shown)
+    picture = cv2.imdecode(np.frombuffer(base64.b64decode(png), np.uint8), cv2.IMREAD_COLOR)
+    assert picture.shape == (360, 640, 3)
+    blue, _, red = picture.reshape(-1, 3).T.astype(int)
+    assert (red - blue > 50).mean() > 0.01  # the red box
+    assert "<iframe" in shown and '<source media="not print"' in shown
+    p.disconnect(client)  # nothing is left to take a picture of, the recording is
+    assert "<iframe" in recorder._repr_html_() and "<img" not in recorder._repr_html_()
 
 
 def test_stl_and_obj_give_the_same_triangles(tmp_path):
