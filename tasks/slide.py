@@ -64,5 +64,6 @@ class Slide(TaskEnv):
         ]
 
 
-# Twice the others' policy steps: after 10,000 one hit in a few still sends the puck 5 cm too far.
+# Four times the others' policy steps: after 10,000 some hits of two policies in three, trained with
+# lambda 1 and 1, still sent the puck 5 cm too far.
 RECIPE = Recipe(human_frames=650, robot_frames=2120, policy_steps=20_000)
