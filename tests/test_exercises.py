@@ -75,6 +75,13 @@ def test_an_answer_that_is_always_the_same_earns_nothing(exercise, value):
     assert judge(exercise, lambda args: (value, False)).points == 0
 
 
+def test_a_hint_that_explains_little_of_what_is_wrong_is_not_given():
+    exercise = ALL["6.4"]
+    result = judge(exercise, trusted(exercise, "def trim(z, least):\n    return z[::2]"))
+    assert result.points == 0  # and one result of five is that of > for >=
+    assert not {o.message for o in result.outcomes} & {m.hint for m in exercise.mistakes}
+
+
 def test_ints_that_numpy_cannot_hold_do_not_pass():
     assert decode(encode(1 << 62)) == 1 << 62
     assert type(decode(encode(1 << 63))) is Other

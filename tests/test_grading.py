@@ -5,6 +5,7 @@ import copy
 import csv
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -21,12 +22,16 @@ from tests.grade import sandbox
 from tests.grade.__main__ import main, safe
 from tests.grade.cell.worker import has_landlock
 from tests.grade.exercise import find
+from tests.grade.sandbox import Sandbox
+from tests.grade.submission import STUB, Answer
 
 ROOT = Path(__file__).resolve().parent.parent
-SOLVED = json.loads((ROOT / "solutions" / "06_reward.ipynb").read_text())
+SOURCE = ROOT / "solutions" / "06_reward.ipynb"
+SOLVED = json.loads(SOURCE.read_text())
 E61 = find("6.1")
 REST = sum(find(f"6.{i}").points for i in (2, 3, 4, 5))
 RIGHT = E61.source
+NEEDS = RIGHT.replace("    return", "    got\n    return")  # what it could not get hold of
 COUNTING = RIGHT.replace("    return", "    global calls\n    calls += 1\n    return")
 # What 6.1 is answered with, and how many points that is worth.
 BAD = {
@@ -46,7 +51,7 @@ BAD = {
     "os._exit(0)": ("import os\ndef r1(z, z_E):\n    os._exit(0)", 0),
     "sys.exit": ("import sys\nsys.exit()", 0),
     "sys.exit when called": ("import sys\ndef r1(z, z_E):\n    sys.exit(0)", 0),
-    "kills the parent": ("import os\nos.kill(os.getppid(), 9)\n" + RIGHT, 0),
+    "kills the parent": ("import os\nos.kill(os.getppid(), 9)\n" + RIGHT, E61.points),
     "kills everybody, quietly": (
         "import os\nfor pid in {os.getppid(), 0, -1, *range(2, 400)} - {os.getpid()}:\n"
         "    try:\n        os.kill(pid, 9)\n    except OSError:\n        pass\n" + RIGHT,
@@ -83,10 +88,10 @@ BAD = {
     "counts, right at first": (
         "calls = 0\n" + COUNTING.replace("return", "return (calls > 9) + "), 0,
     ),
-    "reads the solutions": (f"open({str(ROOT / 'solutions' / '06_reward.ipynb')!r}).read()\n" + RIGHT, 0),
-    "reads another submission": ("open(CLASS + '/good/06_reward.ipynb').read()\n" + RIGHT, 0),
-    "reads the checks": (f"open({str(ROOT / 'tests' / 'test_grading.py')!r}).read()\n" + RIGHT, 0),
-    "opens a socket": ("import socket\nsocket.create_connection(('127.0.0.1', 80), 1)\n" + RIGHT, 0),
+    "reads the solutions": (f"got = open({str(SOURCE)!r}).read()\n" + NEEDS, 0),
+    "reads another submission": ("got = open(CLASS + '/good/06_reward.ipynb').read()\n" + NEEDS, 0),
+    "reads the checks": (f"got = open({str(ROOT / 'tests' / 'test_grading.py')!r}).read()\n" + NEEDS, 0),
+    "opens a socket": ("import socket\ngot = socket.socket()\n" + NEEDS, 0),
     "imports the answer": (
         "from lbw_minimal.reward import KeypointReward\n"
         "def r1(z, z_E):\n    return KeypointReward(z_E, form='literal')(z, z)[1]['r1']",
@@ -95,12 +100,13 @@ BAD = {
     "imports when called": (
         "def r1(z, z_E):\n    from lbw_minimal.reward import KeypointReward\n    return 0.0", 0,
     ),
-    "starts a program": ("import subprocess\nsubprocess.run(['ls'])\n" + RIGHT, 0),
+    "starts a program": ("import subprocess\ngot = subprocess.run(['ls'])\n" + NEEDS, 0),
     "forges the channel": (
         "import os\nfor fd in range(3, 64):\n    try:\n        os.write(fd, bytes(8) + b'{}' * 100)\n"
         "    except OSError:\n        pass\n" + RIGHT,
         0,
     ),
+    "nearly always the same": ("def r1(z, z_E):\n    return -1e-9 * np.abs(z).sum()", 0),
     "endless recursion": ("def r1(z, z_E):\n    return r1(z, z_E)", 0),
     "crashes Python": ("import ctypes\nctypes.string_at(0)", 0),
     "a list that holds itself": ("def r1(z, z_E):\n    x = []\n    x.append(x)\n    return x", 0),
@@ -109,6 +115,16 @@ BAD = {
         "import threading, time\nthreading.Thread(target=time.sleep, args=(10_000,)).start()\n" + RIGHT,
         E61.points,
     ),
+    # Right answers that do not look like ours.
+    "the stub left below": (RIGHT + f"    {STUB}\n", E61.points),
+    "the stub as a comment": (f"# {STUB}\n{RIGHT}", E61.points),
+    "a lambda": ("r1 = lambda z, z_E: -np.sqrt(((z_E[:-1] - z) ** 2).sum((1, 2))).min()", E61.points),
+    "tries it out": (f"{RIGHT}\nprint(r1(z_E[0], z_E))\ndisplay(r1)\nassert not r1(z_E[0], z_E)", E61.points),
+    "checks itself": (f"from tests.grade import check\n{RIGHT}\ncheck('6.1')", E61.points),
+    "plots": (f"import matplotlib.pyplot as plt\n{RIGHT}\nplt.plot([0, 1])", E61.points),
+    "magic": (f"%%time\n{RIGHT}\nnp.linalg.norm?\n!ls\n%timeit r1", E61.points),
+    "a line that begins with %": (RIGHT + "\nprint('%s of %s'\n      % (1, 2))", E61.points),
+    "from the future": ("from __future__ import annotations\n" + RIGHT, E61.points),
 }  # fmt: skip
 
 
@@ -233,6 +249,41 @@ def strange_metadata():
     return notebook
 
 
+def more(below, above=(), own=f"def r1(z, z_E):\n    {STUB}"):
+    """Notebook 6 with other cells around that of 6.1."""
+    notebook = answered(own)
+    at = notebook["cells"].index(cell_of(notebook, "ex-6-1"))
+    new = [{"cell_type": "code", "metadata": {}, "source": text} for text in (*above, *below)]
+    notebook["cells"][at + 1 : at + 1] = new[len(above) :]
+    notebook["cells"][at:at] = new[: len(above)]
+    return notebook
+
+
+def split():
+    notebook = more([""], own=RIGHT)
+    at = notebook["cells"].index(cell_of(notebook, "ex-6-1"))
+    notebook["cells"][at + 1]["metadata"] = notebook["cells"][at]["metadata"]
+    return notebook
+
+
+def unmarked():
+    """Neither grade ids nor the lines that name the exercises."""
+    notebook = copy.deepcopy(SOLVED)
+    for cell in notebook["cells"]:
+        cell["metadata"] = {}
+        cell["source"] = re.sub(r"^# Exercise .*\n", "", "".join(cell["source"]))
+    return notebook
+
+
+USES = "def r1(z, z_E):\n    return -sqrt(sq(z_E[:-1] - z).sum(AXES).min() + EPS) * ONE + length(z - z)"
+HELPERS = [
+    "from math import *",
+    "sq = lambda x: np.square(x)",
+    "ONE, TWO = 1, 2",
+    "EPS: float = 0.0",
+    "AXES = tuple(np.array([1, 2]))",
+    "length = np.linalg.norm",
+]
 FULL = E61.points + REST
 ODD = {
     "invalid JSON": ('{"cells": [', 0),
@@ -244,6 +295,25 @@ ODD = {
     "a cell duplicated": (duplicated(), FULL),
     "cells reordered": (reordered(), FULL),
     "a grade id renamed": (renamed(), FULL),
+    "answered in a cell below": (more([RIGHT]), FULL),
+    "a helper in the cell, the answer below": (
+        more([RIGHT.replace("np.sqrt", "root")], own="root = np.sqrt"),
+        FULL,
+    ),
+    "a cell split in two": (split(), FULL),
+    "helpers of all kinds": (more([], HELPERS, USES), FULL),
+    "a helper that means something else below": (
+        more(
+            ["def length(x):\n    return 0"],
+            ["length = np.linalg.norm"],
+            RIGHT.replace(
+                "np.sqrt(((z_E[:-1] - z) ** 2).sum(axis=(1, 2)))",
+                "np.array([length(x - z) for x in z_E[:-1]])",
+            ),
+        ),
+        FULL,
+    ),
+    "no marks at all": (unmarked(), FULL),
     "another kernel": (other_kernel(), FULL),
     "strange metadata": (strange_metadata(), FULL),
     "José Müller  (2)": (SOLVED, FULL),
@@ -384,9 +454,79 @@ def test_what_breaks_the_grader_costs_one_submission_and_is_told(tmp_path, monke
     assert [row[0] for row in rows] == ["submission", "ann", "bob"] and "a bug of ours" in rows[1][-1]
 
 
-def test_a_wrong_folder_is_one_sentence(tmp_path, capsys):
-    assert main([str(tmp_path / "nowhere")]) == 2
+@pytest.mark.parametrize(
+    "line",
+    ["nowhere", "empty", "class --notebooks 66", "class --notebooks 6,x", "a.zip", "class --out a.zip",
+     "class --out a.zip/x", "no_notebooks"],
+)  # fmt: skip
+def test_a_wrong_command_is_one_sentence(tmp_path, capsys, monkeypatch, line):
+    monkeypatch.chdir(tmp_path)
+    write(tmp_path / "class", "ann", SOLVED)
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "no_notebooks" / "ann").mkdir(parents=True)
+    (tmp_path / "a.zip").write_bytes(b"PK")
+    assert main(line.split()) == 2
     assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_a_flat_folder_is_a_class_unless_its_names_are_those_of_the_course(tmp_path):
+    (tmp_path / "flat").mkdir()
+    (tmp_path / "one").mkdir()
+    for path in ("flat/ann.ipynb", "flat/bob.ipynb", "one/06_reward.ipynb"):
+        (tmp_path / path).write_text(json.dumps(unmarked()))
+    out = tmp_path / "flat" / "grades"  # inside the class: it is no submission, neither then nor later
+    for folder in ("flat", "flat", "one"):
+        assert main([str(tmp_path / folder), "--out", str(out), "--notebooks", " 06"]) == 0
+    assert {name: sum(g[:2]) for name, g in grades(out).items()} == {
+        "ann.ipynb": FULL, "bob.ipynb": FULL, "one": FULL,
+    }  # fmt: skip
+
+
+def test_an_interrupted_grading_says_how_to_go_on(tmp_path, monkeypatch, capsys):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    write(tmp_path / "class", "ann", SOLVED)
+    monkeypatch.setattr(grading, "grade", interrupted)
+    assert main([str(tmp_path / "class"), "--out", str(tmp_path / "out")]) == 130
+    assert "goes on where" in capsys.readouterr().err
+
+
+def test_of_two_versions_the_one_with_the_released_name_counts_and_it_is_said(tmp_path):
+    write(tmp_path / "class", "ann", SOLVED)
+    (tmp_path / "class" / "ann" / "z_old.ipynb").write_text(
+        json.dumps(answered("def r1(z, z_E):\n    return 1"))
+    )
+    assert main([str(tmp_path / "class"), "--out", str(tmp_path / "out")]) == 0
+    first, others, message = grades(tmp_path / "out")["ann"]
+    assert (first, others) == (E61.points, REST) and "6.1 stands in z_old.ipynb, too" in message
+
+
+def test_an_answer_that_counts_its_calls_and_remembers_what_it_said_earns_nothing():
+    """It knows the order of the checks, and says the same again to what it has heard before."""
+    exercise = find("10.4")
+    said = [
+        str(exercise.run(exercise.source)(check.inputs(np.random.default_rng([2, i]))))
+        for i, check in enumerate(exercise.checks)
+    ]
+    source = (
+        f"said, heard = {said!r}, {{}}\n"
+        "def verdict(*args):\n"
+        "    key = b''.join(x.tobytes() for x in args)\n"
+        "    return heard.setdefault(key, said[min(len(heard) // 3, len(said) - 1)])\n"
+    )
+    with Sandbox() as box:
+        result = grading.grade_one(exercise, Answer(source, [], ""), box, seed=2)
+    assert result.points == 0
+    assert "after other inputs" in " ".join(result.lines())
+
+
+def test_one_open_case_costs_its_own_checks_only():
+    exercise = find("10.4")
+    source = exercise.source.replace("    if not expert.all():", f"    {STUB}\n    if not expert.all():")
+    with Sandbox() as box:
+        result = grading.grade_one(exercise, Answer(source, [], ""), box)
+    assert 0 < result.points < result.most and not result.open
 
 
 def test_without_either_wall_the_warning_says_that_files_can_be_read(monkeypatch):

@@ -8,6 +8,7 @@ request, Gradescope's results.json. What is finished is not graded again unless 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import csv
 import hashlib
 import io
@@ -23,42 +24,40 @@ import torch
 
 from lbw_minimal.training import write_atomic
 from tests.grade import feedback, sandbox
-from tests.grade.exercise import everything
+from tests.grade.exercise import Exercise, everything
 from tests.grade.judge import Result, judge, nothing
 from tests.grade.sandbox import Lost, Sandbox
-from tests.grade.submission import MOST, STUB, Unreadable, answer, cells
+from tests.grade.submission import MOST, RELEASED, Answer, Unreadable, answer, read
 
 MANY = 50  # notebooks of one submission that are read
 SEED = 2  # other inputs than those of the students' own checks, which could be learnt by heart
 
 
 def main(argv=None) -> int:
-    """Returns the exit code: 2 where there is nothing to grade, 1 if the grader failed on a submission."""
+    """Returns the exit code: 2 where there is nothing to grade, 1 if the grader failed on a submission, 130
+    if it was interrupted."""
     parser = argparse.ArgumentParser(prog="python -m tests.grade", description=__doc__.split("\n")[0])
     parser.add_argument("folder", type=Path, help="submissions: one folder or one notebook each")
     parser.add_argument("--out", type=Path, default=Path("grades"))
     parser.add_argument("--notebooks", help="numbers, such as 5 or 5,6; default: all that anyone handed in")
     parser.add_argument("--seed", type=int, default=SEED, help="of the inputs; students have 0 (%(default)s)")
-    parser.add_argument("-j", "--jobs", type=int, default=2, help="submissions at a time")
+    jobs = {"type": int, "choices": range(1, 65), "default": 2, "metavar": "N"}
+    parser.add_argument("-j", "--jobs", **jobs, help="submissions at a time")
     parser.add_argument("--gradescope", action="store_true", help="write results.json for Gradescope, too")
     args = parser.parse_args(argv)
-    if not args.folder.exists():
-        print(f"{args.folder}: no such folder", file=sys.stderr)
+    try:
+        entries = submissions(args.folder, args.out)
+        ids = wanted(args.notebooks, entries)
+        args.out.mkdir(parents=True, exist_ok=True)
+    except ValueError as e:
+        print(e, file=sys.stderr)
+        return 2
+    except OSError as e:
+        print(f"{args.out}: cannot write there ({e.strerror}); give another --out", file=sys.stderr)
         return 2
     if lacks := sandbox.warning():
         print(f"warning: {lacks}", file=sys.stderr)
     torch.set_num_threads(1)
-    single = args.folder.suffix == ".ipynb" or (any(args.folder.glob("*.ipynb")) and _is_one(args.folder))
-    entries = [args.folder] if single else sorted(p for p in args.folder.iterdir() if not hidden(p))
-    try:
-        numbers = args.notebooks.split(",") if args.notebooks else handed_in(entries)
-        ids = [id for id in everything() if id.split(".")[0] in numbers]
-    except ValueError:
-        ids = []
-    if not ids:
-        print("no exercises to grade: give --notebooks with their numbers", file=sys.stderr)
-        return 2
-    args.out.mkdir(parents=True, exist_ok=True)
 
     def job(entry):
         try:
@@ -72,16 +71,49 @@ def main(argv=None) -> int:
         return done
 
     with ThreadPoolExecutor(args.jobs) as pool:
-        grades = list(pool.map(job, entries))
+        try:
+            grades = list(pool.map(job, entries))
+        except KeyboardInterrupt:
+            pool.shutdown(wait=False, cancel_futures=True)
+            print("interrupted; the same command goes on where this one was", file=sys.stderr)
+            return 130
     write_atomic(args.out / "class.csv", table(grades, ids))
     write_atomic(args.out / "junit.xml", feedback.junit(grades))
     return 1 if any("failed" in g for g in grades) else 0
 
 
-def _is_one(folder: Path) -> bool:
-    """Whether a folder with notebooks in it is one submission, not a class: no exercise stands in two."""
-    ids = [i for path in notebooks(folder) for i in _ids(path)]
-    return len(ids) == len(set(ids))
+def submissions(folder: Path, out: Path) -> list[Path]:
+    """The submissions in a class's folder. Raises ValueError where there are none.
+
+    A folder of notebooks that are all called as they were released is one submission.
+    """
+    if not folder.exists():
+        raise ValueError(f"{folder}: no such folder")
+    if not folder.is_dir() and folder.suffix != ".ipynb":
+        raise ValueError(f"{folder}: neither a folder nor a notebook; unpack an archive first")
+    loose = {path.name for path in folder.glob("*.ipynb")} if folder.is_dir() else {folder.name}
+    if folder.is_file() or (loose and loose <= {path.name for path in RELEASED.glob("*.ipynb")}):
+        print(f"{folder} is graded as one submission")
+        return [folder]
+    found = sorted(p for p in folder.iterdir() if not hidden(p) and p.resolve() != out.resolve())
+    if not found:
+        raise ValueError(f"{folder}: no submissions in it")
+    return found
+
+
+def wanted(numbers: str | None, entries: list[Path]) -> list[str]:
+    """The exercises of notebooks by their numbers, "5" or "5,6"; else of all that the class handed in.
+
+    Raises ValueError where there are none.
+    """
+    known = sorted({id.split(".")[0] for id in everything()}, key=int)
+    given = [n.strip() for n in numbers.split(",")] if numbers else handed_in(entries)
+    given = [n.lstrip("0") or "0" for n in given if n]
+    if strange := [n for n in given if n not in known]:
+        raise ValueError(f"no notebook {', '.join(strange)}: there are {', '.join(known)}")
+    if not given:
+        raise ValueError("nobody handed in a notebook of the course; --notebooks says which to expect")
+    return [id for id in everything() if id.split(".")[0] in given]
 
 
 def hidden(entry: Path) -> bool:
@@ -99,50 +131,52 @@ def notebooks(entry: Path) -> list[Path]:
     return [p for p in found if not p.is_symlink()][:MANY]
 
 
-def _ids(path: Path) -> set[str]:
-    try:
-        found = {c["id"] for c in cells(path)}
-    except Unreadable:
-        return set()
-    return {id for id, e in everything().items() if e.grade_id in found}
-
-
 def handed_in(entries: list[Path]) -> list[str]:
     """Numbers of the notebooks that the class handed in."""
-    return sorted({id.split(".")[0] for entry in entries for path in notebooks(entry) for id in _ids(path)})
+    found = set()
+    for path in (path for entry in entries for path in notebooks(entry)):
+        with contextlib.suppress(Unreadable):
+            found.add(read(path).number)
+    return sorted(found - {""})
 
 
 def grade(entry: Path, ids: list[str], seed: int = SEED) -> tuple[list[Result], list[str]]:
     """Results of the exercises `ids` in one submission, and what went wrong with its files."""
-    code, notes = [], []
+    books, notes = [], []
     for path in notebooks(entry):
         try:
-            code += cells(path)
+            books.append(read(path))
         except Unreadable as e:
             notes.append(f"{path.name}: {e}")
-    if not code and not notes:
-        notes.append("no notebook found")
+    if not books and not notes:
+        notes.append("no notebook found; an archive has to be unpacked first")
     known, results = everything(), []
     with Sandbox() as box:
         for id in ids:
-            exercise, source = known[id], answer(known[id], code)
-            if source is None:
-                results.append(nothing(exercise, "no cell with this exercise", open=True))
-            elif STUB in source:
-                results.append(nothing(exercise, "not done yet", open=True))
-            else:
-                results.append(grade_one(exercise, source, box, seed))
+            given = answer(known[id], books)
+            if given is None:
+                results.append(nothing(known[id], "no cell with this exercise", open=True))
+                continue
+            if given.elsewhere:
+                notes.append(f"{id} stands in {given.elsewhere}, too; that of {given.where} was graded")
+            results.append(grade_one(known[id], given, box, seed))
     return results, notes
 
 
-def grade_one(exercise, source: str, box: Sandbox, seed: int = 0) -> Result:
+def grade_one(exercise: Exercise, given: Answer, box: Sandbox, seed: int = 0) -> Result:
     """The result of one answer, run in the sandbox."""
+
+    def renew():
+        box.close()
+        if box.open(exercise, given.source, given.helpers) is not None:
+            raise Lost("the cell runs once, but not a second time")
+
     try:
-        failed = box.open(source, exercise.given, exercise.probe)
+        failed = box.open(exercise, given.source, given.helpers)
         if failed is not None:
             text = getattr(failed, "text", "")
             return nothing(exercise, f"the cell does not run: {failed}: {text}" if text else f"{failed}")
-        return judge(exercise, box.call, seed)
+        return judge(exercise, box.call, seed, renew)
     except Lost as e:
         return nothing(exercise, str(e))
     finally:

@@ -11,11 +11,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tests.grade.cell.wire import Other, Raised, encode
+from tests.grade.cell.wire import Other, Raised
 from tests.grade.exercise import Check, Exercise, different
 from tests.grade.sandbox import Lost
 
 OPEN = ("NotImplementedError", "StillOpen")  # what an untouched exercise raises
+UNDONE = "not done yet"
 
 
 @dataclass
@@ -61,20 +62,21 @@ def nothing(exercise: Exercise, message: str, open: bool = False) -> Result:
     return Result(exercise.id, exercise.title, outcomes, open)
 
 
-def judge(exercise: Exercise, call, seed: int = 0) -> Result:
+def judge(exercise: Exercise, call, seed: int = 0, renew=None) -> Result:
     """Run all checks of an exercise on the answer behind call(args) -> (value, changed its inputs).
 
-    A call that raises Lost ends the exercise: what was earned before stays. An answer that is the same for
-    all inputs earns nothing, also where it happens to be right.
+    renew() starts that answer afresh, as if it had never been called. A call that raises Lost ends the
+    exercise: what was earned before stays. An answer that is the same for all inputs earns nothing, also
+    where it happens to be right; nor does one that hangs on what it was asked before.
     """
     reference = exercise.run(exercise.source)
     mistakes = [(m.hint, exercise.run(exercise.wrong(m))) for m in exercise.mistakes]
-    result, lost, first = Result(exercise.id, exercise.title), "", None
-    answers, truths, guesses = set(), set(), []
+    result, lost, known = Result(exercise.id, exercise.title), "", []
+    answers, truths, guesses = [], [], []
     for i, check in enumerate(exercise.checks):
         rng = np.random.default_rng([seed, i])
         message, hints = lost, []
-        for _ in range(check.trials):
+        for trial in range(check.trials):
             if message:
                 break
             args = check.inputs(rng)
@@ -84,25 +86,31 @@ def judge(exercise: Exercise, call, seed: int = 0) -> Result:
                 message = lost = str(e)
                 break
             if type(got) is Raised and got in OPEN:
-                return nothing(exercise, "not done yet", open=True)
+                message = UNDONE
+                break
             want = reference(args)
-            answers.add(encode(got))
-            truths.add(encode(want))
+            answers.append(got)
+            truths.append(want)
             message = _message(check, got, want, args)
             hints = [h for h, wrong in mistakes if _same(check, got, wrong(args), want)] if message else []
             if not message and changed:
                 message = "it changes its inputs: work on a copy"
-            if not message and first is None:
-                first = args, got
+            if trial == 0:
+                known.append((args, got))
         result.outcomes.append(Outcome(check.label, 0 if message else check.points, check.points, message))
         guesses.append(hints)
-    # On some inputs two mistakes give the same answer; the one that explains most checks is it.
-    votes = Counter(hint for hints in guesses for hint in hints)
+    if all(o.message == UNDONE for o in result.outcomes):
+        return nothing(exercise, UNDONE, open=True)
+    # On some inputs two mistakes give the same answer: the one that explains most checks is it, if that is
+    # half of what went wrong. A mistake that explains less happens to give the same there.
+    votes = Counter(hint for hints in guesses for hint in set(hints))
+    wrong = sum(o.points == 0 and o.message not in (lost, UNDONE) for o in result.outcomes)
     for outcome, hints in zip(result.outcomes, guesses, strict=True):
-        outcome.message = max(hints, key=votes.get, default=outcome.message)
-    if first and not lost:
-        same = len(answers) == 1 < len(truths)
-        message = "it returns the same, whatever it is given" if same else _repeat(first, call)
+        likely = [h for h in hints if 2 * votes[h] >= wrong]
+        outcome.message = max(likely, key=votes.get, default=outcome.message)
+    if any(o.points for o in result.outcomes) and not lost:
+        same = _all_same(answers) and not _all_same(truths)
+        message = "it returns the same, whatever it is given" if same else _repeat(known, call, renew)
         if message:
             for o in result.outcomes:
                 o.points, o.message = 0, o.message or message
@@ -127,12 +135,34 @@ def _same(check: Check, got, theirs, want) -> bool:
     return not different(got, theirs, check) and bool(different(want, theirs, check))
 
 
-def _repeat(first, call) -> str:
-    """The first input once more: a function's answer hangs on its inputs alone."""
-    args, before = first
+EXACT = Check("", lambda rng: (), 0, 1e-6, 1e-6, 1, None)
+
+
+def _all_same(values) -> bool:
+    """Whether values are equal, but for what a check would not notice."""
+    loose = Check("", lambda rng: (), 0, 1e-5, 1e-4, 1, None)
+    return not any(different(v, values[0], loose) for v in values)
+
+
+def _repeat(known, call, renew) -> str:
+    """Inputs once more: a function's answer hangs on its inputs alone.
+
+    First the very first, then, of the answer afresh, one of every check, the last check first: an answer
+    that counts its calls, or remembers what it said, is at another place then.
+    """
     try:
-        again, _ = call(args)
+        if not _agrees(known[0], call):
+            return "the same input gives another answer the second time"
+        if renew:
+            renew()
+            if not all(_agrees(pair, call) for pair in reversed(known)):
+                return "the same input gives another answer after other inputs"
     except Lost as e:
         return str(e)
-    exact = Check("", lambda rng: (), 0, 1e-6, 1e-6, 1, None)
-    return "the same input gives another answer the second time" if different(again, before, exact) else ""
+    return ""
+
+
+def _agrees(pair, call) -> bool:
+    args, before = pair
+    again, _ = call(args)
+    return not different(again, before, EXACT) or (type(again) is type(before) is Other and again == before)

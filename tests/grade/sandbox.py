@@ -21,6 +21,7 @@ from pathlib import Path
 
 from tests.grade.cell import wire
 from tests.grade.cell.worker import has_landlock
+from tests.grade.exercise import Exercise
 
 CELL = Path(__file__).resolve().parent / "cell"
 SYSTEM = ("/usr", "/lib", "/lib64", "/bin", "/etc/ld.so.cache", "/etc/alternatives")
@@ -28,7 +29,7 @@ DEVICES = ("/dev/null", "/dev/zero", "/dev/random", "/dev/urandom")
 MEMORY = 2 << 30  # bytes a student's code may take
 CPU = 10  # s of processor time for one exercise
 WALL = 15  # s for one call, asleep or not
-ENDED = f"the process ended: an exit, a crash, or more than {CPU} s of processor time"
+ENDED = f"the process ended: an exit, a crash, or more than {CPU} s of processor time (an endless loop?)"
 START = 120  # s for the libraries to load on a busy machine
 
 
@@ -103,13 +104,14 @@ class Sandbox:
             self.channel.close()
             self.process = self.channel = None
 
-    def open(self, source: str, given: str, probe: str) -> wire.Raised | None:
-        """Define `source` after `given`; what it raised, or None. Raises Lost."""
+    def open(self, exercise: Exercise, source: str, helpers: list[str]) -> wire.Raised | None:
+        """Define `source`, an answer, after what it needs; what it raised, or None. Raises Lost."""
         if not self.process:
             self.start()
         self.number += 1
-        job = {"source": source, "given": given, "probe": probe, "number": self.number}
-        self._send(wire.encode(job | {"memory": MEMORY, "cpu": CPU}))
+        job = {"source": source, "helpers": helpers, "name": exercise.name, "given": exercise.given}
+        limits = {"memory": MEMORY, "cpu": CPU}
+        self._send(wire.encode(job | {"probe": exercise.probe, "number": self.number} | limits))
         failed = self._answer()
         if type(failed) is str:  # before the student's first line
             raise RuntimeError(failed)

@@ -7,20 +7,49 @@ import builtins
 import json
 import re
 import symtable
+from collections import Counter
+from dataclasses import dataclass
 from pathlib import Path
 
-from tests.grade.exercise import Exercise
+from IPython.core.inputtransformer2 import TransformerManager
+
+from tests.grade.exercise import Exercise, everything
 
 MOST = 20 << 20  # bytes of a notebook; those of the course have 0.1 MB
 STUB = 'raise NotImplementedError("your lines here")'
+RELEASED = Path(__file__).resolve().parents[2] / "notebooks"
+LIBRARIES = {"math", "np", "torch", "F", "nn"}  # what every exercise may use
 
 
 class Unreadable(Exception):
     """Not a notebook; the message says why, to the student."""
 
 
-def cells(path: Path) -> list[dict]:
-    """The code cells of a notebook: {"id": grade id or None, "source": text}. Raises Unreadable."""
+@dataclass
+class Cell:
+    """A code cell. exercise: the id of the one it is marked for, by grade id or its first line; or ""."""
+
+    source: str
+    exercise: str
+
+
+@dataclass
+class Notebook:
+    """A notebook that somebody handed in. number: which of the course's it is, "" if none."""
+
+    name: str
+    cells: list[Cell]
+    number: str = ""
+
+    def __post_init__(self):
+        votes = Counter(c.exercise.split(".")[0] for c in self.cells if c.exercise)
+        for e in everything().values():
+            votes[e.id.split(".")[0]] += any(_defines(c.source, e.name) for c in self.cells)
+        self.number = max(votes, key=votes.get) if votes.total() else ""
+
+
+def read(path: Path) -> Notebook:
+    """Raises Unreadable."""
     if path.is_symlink() or not path.is_file():
         raise Unreadable("not a plain file")
     if path.stat().st_size > MOST:
@@ -29,80 +58,144 @@ def cells(path: Path) -> list[dict]:
         )
     try:
         found = json.loads(path.read_bytes().decode("utf-8-sig"))["cells"]
-        code = [c for c in found if c["cell_type"] == "code"]
-        return [{"id": _grade_id(c), "source": _plain(c["source"])} for c in code]
+        code = [(c, _plain(c["source"])) for c in found if c["cell_type"] == "code"]
+        return Notebook(path.name, [Cell(source, _marked(c, source)) for c, source in code])
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as e:
         raise Unreadable(f"no Jupyter notebook ({type(e).__name__})") from None
 
 
-def _grade_id(cell) -> str | None:
+def _marked(cell, source: str) -> str:
+    """The exercise a cell is marked for."""
     note = cell.get("metadata", {}).get("nbgrader", {})
-    return note.get("grade_id") if isinstance(note, dict) else None
+    grade_id = note.get("grade_id") if isinstance(note, dict) else None
+    if isinstance(grade_id, str) and (found := re.fullmatch(r"ex-(\d+)-(\d+)", grade_id)):
+        return ".".join(found.groups())
+    found = re.match(r"#\s*Exercise (\d+\.\d+)\b", source)
+    return found[1] if found else ""
 
 
 def _plain(source) -> str:
-    """Cell source without IPython's own lines (%magic, !shell), which are no Python."""
+    """Cell source as Python: IPython's own lines (%magic, !shell, name?) become calls of its shell."""
     text = source if isinstance(source, str) else "".join(source)
-    return re.sub(r"^(\s*)[%!].*$", r"\1pass", text, flags=re.MULTILINE)
+    text = re.sub(r"\A\s*%%.*\n", "", text)  # such as %%time, above a cell that is Python
+    if _parse(text):
+        return text
+    try:
+        return TransformerManager().transform_cell(text)
+    except Exception:  # whatever a stranger's text does to it
+        return text
 
 
 def _parse(source: str) -> ast.Module | None:
     try:
-        return ast.parse(source)
+        tree = ast.parse(source)
+        ast.unparse(tree)  # what is nested too deep for that is for what comes, too
+        return tree
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         return None
 
 
+def _is_stub(node) -> bool:
+    """Whether a function or class has nothing but the line that was handed out, in one of its bodies."""
+    bodies = [n.body for n in ast.walk(node) if isinstance(n, ast.FunctionDef)]
+    return any(ast.unparse(body[-1]) == ast.unparse(ast.parse(STUB)) and _bare(body) for body in bodies)
+
+
+def _bare(body) -> bool:
+    """Whether a body has one statement, beside its docstring."""
+    return len(body) == 1 or (len(body) == 2 and isinstance(body[0], ast.Expr))
+
+
 def _defined(node) -> set[str]:
-    """Names that a top-level statement defines, if it only defines."""
+    """Names that a top-level statement defines, if it only defines; "*" if nobody knows which."""
     if isinstance(node, ast.FunctionDef | ast.ClassDef):
         return {node.name}
     if isinstance(node, ast.Import | ast.ImportFrom):
         return {(alias.asname or alias.name).split(".")[0] for alias in node.names}
-    if isinstance(node, ast.Assign) and all(isinstance(t, ast.Name) for t in node.targets):
-        busy = ast.Call | ast.Attribute | ast.Subscript | ast.Await
-        simple = not any(isinstance(n, busy) for n in ast.walk(node.value))
-        return {t.id for t in node.targets} if simple else set()
+    if isinstance(node, ast.Assign | ast.AnnAssign) and node.value and not _busy(node.value):
+        targets = getattr(node, "targets", None) or [node.target]
+        names = [t.elts if isinstance(t, ast.Tuple | ast.List) else [t] for t in targets]
+        flat = [t for some in names for t in some]
+        return {t.id for t in flat} if all(isinstance(t, ast.Name) for t in flat) else set()
     return set()
 
 
-def answer(exercise: Exercise, code: list[dict]) -> str | None:
-    """The source that answers an exercise: its cell, and from other cells the definitions it uses.
+def _busy(value) -> bool:
+    """Whether an expression calls anything but Python and the libraries; a lambda's body is not called."""
+    if isinstance(value, ast.Lambda):
+        return False
+    if isinstance(value, ast.Await):
+        return True
+    if isinstance(value, ast.Call):
+        root = value.func
+        while isinstance(root, ast.Attribute):
+            root = root.value
+        if not isinstance(root, ast.Name) or root.id not in LIBRARIES | set(dir(builtins)):
+            return True
+    return any(map(_busy, ast.iter_child_nodes(value)))
 
-    The cell is found by its grade id; where that is gone, by the name it defines. Of several the last that
-    is no stub counts. None if there is none.
-    """
-    own = [c["source"] for c in code if c["id"] == exercise.grade_id]
-    own = own or [c["source"] for c in code if _defines(c["source"], exercise.name)]
-    if not own:
-        return None
-    source = ([s for s in own if STUB not in s] or own)[-1]
-    return "\n".join([*_helpers(source, code, exercise), source])
 
-
-def _defines(source, name) -> bool:
+def _defines(source: str, name: str) -> bool:
+    """Whether a cell defines a name, with more than was handed out."""
     tree = _parse(source)
-    return tree is not None and any(name in _defined(node) for node in tree.body)
+    return bool(tree) and any(name in _defined(node) and not _is_stub(node) for node in tree.body)
 
 
-def _helpers(source: str, code: list[dict], exercise: Exercise) -> list[str]:
-    """Imports, functions and constants of other cells that `source` uses, in the order of the notebook."""
-    known = set(dir(builtins)) | {"math", "np", "torch", "F", "nn"}
+@dataclass
+class Answer:
+    """The cell that answers an exercise, the definitions of other cells that it uses, and where it stands."""
+
+    source: str
+    helpers: list[str]
+    where: str
+    elsewhere: str = ""  # another notebook of the submission that answers the exercise, too
+
+
+def answer(exercise: Exercise, books: list[Notebook]) -> Answer | None:
+    """What answers an exercise in the notebooks of a submission; None if there is nothing.
+
+    A cell marked for it that defines its name with more than the stub; else another cell that does, in a
+    notebook of the exercise's number; else a cell marked for it. Of several the last counts, and of several
+    notebooks the one that is called as it was released.
+    """
+    number = exercise.id.split(".")[0]
+    books = sorted(books, key=lambda book: (RELEASED / book.name).is_file())
+    cells = [(book, i, cell) for book in books for i, cell in enumerate(book.cells)]
+    marked = [place for place in cells if place[2].exercise == exercise.id]
+    others = [place for place in cells if not place[2].exercise and place[0].number == number]
+    done = [place for place in marked if _defines(place[2].source, exercise.name)]
+    found = done or [p for p in others if _defines(p[2].source, exercise.name)] or marked
+    if not found:
+        return None
+    book, i, cell = found[-1]
+    rest = [b.name for b, _, c in found if b is not book and c.source != cell.source]
+    return Answer(cell.source, _helpers(book.cells, i, exercise), book.name, rest[-1] if rest else "")
+
+
+def _helpers(cells: list[Cell], own: int, exercise: Exercise) -> list[str]:
+    """Imports, functions and constants of other cells that cell `own` uses, in the order of the notebook.
+
+    Of several definitions of a name the last above the cell counts, else the first below.
+    """
+    source = cells[own].source
+    known = set(dir(builtins)) | LIBRARIES
     for text in (exercise.given, source):
         known |= {name for node in getattr(_parse(text), "body", []) for name in _defined(node)}
-    offers = []
-    for cell in code:
-        tree = _parse(cell["source"]) if STUB not in cell["source"] else None
-        offers += [(_defined(node), ast.unparse(node)) for node in (tree.body if tree else [])]
-    wanted, taken = _names(source) - known, set()
+    offers = []  # (cell, names, text)
+    for i, cell in enumerate(cells):
+        tree = _parse(cell.source) if i != own else None
+        offers += [(i, _defined(n), ast.unparse(n)) for n in (tree.body if tree else []) if not _is_stub(n)]
+    wanted = _names(source) - known
+    taken = {k for k, (_, names, _) in enumerate(offers) if "*" in names}
     while wanted:
         name = wanted.pop()
         known.add(name)
-        for i, (names, text) in enumerate(offers):
-            if name in names and i not in taken:
-                taken.add(i)
-                wanted |= _names(text) - known
-    return [offers[i][1] for i in sorted(taken)]
+        places = [k for k, (_, names, _) in enumerate(offers) if name in names]
+        above = [k for k in places if offers[k][0] < own]
+        for k in [*above[-1:], *places][:1]:
+            taken.add(k)
+            wanted |= _names(offers[k][2]) - known
+    return [offers[k][2] for k in sorted(taken)]
 
 
 def _names(source: str) -> set[str]:

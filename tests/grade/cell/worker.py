@@ -4,6 +4,7 @@ Started as `python -I worker.py FD READABLE...`, best inside bubblewrap. It impo
 and forks for every exercise; the fork confines itself before it runs a line of the student's.
 """
 
+import ast
 import contextlib
 import ctypes
 import io
@@ -148,12 +149,44 @@ def filter_calls() -> None:
     _prctl(22, 2, header)  # PR_SET_SECCOMP, SECCOMP_MODE_FILTER
 
 
+class Shell:
+    """What a notebook's cells may call beside Python; here it does nothing."""
+
+    def __getattr__(self, name):
+        return lambda *args, **kwargs: None
+
+
+def define(job: dict) -> tuple[dict, Exception | None]:
+    """The names a student's code defines. Raises what it raises.
+
+    A cell that fails may do so in a line beside the answer, such as a plot or a print of the notebook's own
+    variables: then its definitions are run alone, and what it raised is returned.
+    """
+    failed = None
+    space = {"__name__": "__main__", "get_ipython": Shell, "display": print, "check": Shell().check}
+    exec(compile(PREAMBLE + job["given"], "given", "exec"), space)
+    for helper in job["helpers"]:
+        with contextlib.suppress(Exception):  # where the answer needs it, the answer fails
+            exec(compile(helper, "another cell", "exec"), space)
+    try:
+        exec(compile(job["source"], "your cell", "exec"), space)
+    except Exception as e:
+        failed = e
+        space.pop(job["name"], None)
+        kinds = ast.FunctionDef | ast.ClassDef | ast.Import | ast.ImportFrom | ast.Assign | ast.AnnAssign
+        for node in ast.parse(job["source"]).body:
+            with contextlib.suppress(Exception):
+                if isinstance(node, kinds):
+                    exec(compile(ast.Module([node], []), "your cell", "exec"), space)
+        if job["name"] not in space:
+            raise
+    return space, failed
+
+
 def run(job: dict, answer) -> None:
     """Define the student's names and call the probe on every input the judge sends."""
-    space = {"__name__": "__main__"}
     try:
-        exec(compile(PREAMBLE + job["given"], "given", "exec"), space)
-        exec(compile(job["source"], "your cell", "exec"), space)
+        space, failed = define(job)
         exec(compile(job["probe"], "the check", "exec"), space)
     except BaseException as e:
         answer(wire.Raised(type(e).__name__, str(e)[:1000]))
@@ -169,6 +202,8 @@ def run(job: dict, answer) -> None:
             value = space["probe"](*args)
             changed = wire.encode(args) != request
         except BaseException as e:
+            if isinstance(e, NameError) and isinstance(failed, ImportError):
+                e = failed  # what is missing was to be imported
             value, changed = wire.Raised(type(e).__name__, str(e)[:1000]), False
         answer([value, changed])
 

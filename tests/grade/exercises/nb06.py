@@ -140,17 +140,26 @@ def _with_pauses(rng):
     return z + rng.normal(0, 1e-3, z.shape), 0.05
 
 
+def _slow(rng):
+    """A steady motion of steps far shorter than `least`."""
+    return np.linspace(0, 1, rng.integers(40, 80))[:, None, None] * rng.uniform(0.5, 1, (1, 3, 2))
+
+
+def _rest(rng):
+    return np.repeat(rng.normal(size=(1, 4, 2)), rng.integers(3, 12), axis=0)
+
+
 trim.check("a demonstration with pauses", _with_pauses)
 trim.check(
     "slow motion is kept where it adds up",
-    lambda rng: (np.linspace(0, 1, 60)[:, None, None] * np.ones((1, 3, 2)), 0.2),
+    lambda rng: (_slow(rng), rng.uniform(0.15, 0.4)),
 )
 trim.check("where nothing rests, every frame stays, once", lambda rng: (_walk(rng, 10), 0.01))
 trim.check(
     "a frame exactly `least` away stays",
     lambda rng: (0.5 * np.arange(rng.integers(6, 12))[:, None, None] * np.array([[1.0, 0.0]]), 0.5),
 )
-trim.check("first and last frame stay", lambda rng: (np.zeros((8, 4, 2)), 0.1))
+trim.check("first and last frame stay", lambda rng: (_rest(rng), 0.1))
 trim.mistake(
     "Compare with the last frame you kept, not with the one before: slow motion would vanish as a whole.",
     "z[kept[-1]]",
@@ -186,6 +195,10 @@ def timed_r1(z_next, z_E, t):
 
 
 timed_r1.check("on the way", lambda rng: (rng.normal(size=(5, 2)), _walk(rng, 20), int(rng.integers(18))))
+timed_r1.check(
+    "at t = N - 1 its end has just passed",
+    lambda rng: (rng.normal(size=(5, 2)), (z := _walk(rng, int(rng.integers(5, 20)))), len(z) - 1),
+)
 timed_r1.check(
     "after the end the goal stays the goal",
     lambda rng: (rng.normal(size=(5, 2)), _walk(rng, 20), int(rng.integers(19, 37))),

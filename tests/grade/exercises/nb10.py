@@ -89,13 +89,13 @@ def difference(a, b, picks_a, picks_b):
     return float(np.quantile(means, 0.025)), float(np.quantile(means, 0.975))
 
 
-def _seeds(rng, n=5, draws=400):
-    a, b = rng.uniform(0.3, 1, n), rng.uniform(0, 0.9, n)
-    return a, b, rng.integers(0, n, (draws, n)), rng.integers(0, n, (draws, n))
+def _seeds(rng, n=5, m=5, draws=400):
+    a, b = rng.uniform(0.3, 1, n), rng.uniform(0, 0.9, m)
+    return a, b, rng.integers(0, n, (draws, n)), rng.integers(0, m, (draws, m))
 
 
 difference.check("five seeds each", _seeds)
-difference.check("three seeds each", lambda rng: _seeds(rng, 3))
+difference.check("three seeds and four", lambda rng: _seeds(rng, 3, 4))
 difference.check("a method against itself", lambda rng: ((s := _seeds(rng))[0], s[0].copy(), s[2], s[3]))
 difference.mistake(
     "You ask for the middle 90 %: a 95 % interval leaves out 2.5 % on each side.",
@@ -144,12 +144,18 @@ def _task(rng, idle=0.0, random=0.02, expert=1.0):
     return rng.random(20) < idle, np.arange(n) < int(n * random), rng.random(20) < expert
 
 
+def _twentieth(rng):
+    n = 20 * int(rng.integers(2, 8))
+    return np.zeros(20, bool), np.arange(n) < n // 20, rng.random(20) < 1
+
+
 verdict.check("a fair task", lambda rng: _task(rng, random=rng.uniform(0, 0.05)))
 verdict.check(
     "one that idling solves now and then",
     lambda rng: ((t := _task(rng, 0.0))[0] | (np.arange(20) == 7), t[1], t[2]),
 )
 verdict.check("one that chance solves", lambda rng: _task(rng, random=rng.uniform(0.06, 0.5)))
+verdict.check("at just one in twenty chance may stand", _twentieth)
 verdict.check("one with an expert that fails", lambda rng: (*_task(rng)[:2], np.arange(20) != 3))
 verdict.check(
     "two or three of them at once: name the first",
