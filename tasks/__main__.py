@@ -202,9 +202,11 @@ def prepare_folder(out, settings, resume):
 def evaluate(agent, env, n):
     """Test episodes of the deterministic policy: a row each, the first filmed and mirrored in 3-D.
 
-    Success is the paper's: the task is complete at some step within the horizon.
+    Success is the paper's: the task is complete at some step. An episode is as long as in training, so the
+    rest of a long horizon, when the demonstration is over, gives no second chance.
     """
     rows, first, scene = [], {}, None
+    steps = env.get_wrapper_attr("keypoint_reward").episode
     for i in range(n):
         z, _ = env.reset(seed=TEST_SEED + i)
         base = env.unwrapped
@@ -212,14 +214,13 @@ def evaluate(agent, env, n):
         if i == 0:
             recorder = mirror(base)
         film, zs, parts, done, hits = [], [z], [], False, []
-        shown = env.get_wrapper_attr("keypoint_reward").episode  # the rest of a long horizon is standing
         if recorder:
             recorder.snap()
         while not done:
             z, _, terminated, truncated, info = env.step(agent.act(z, deterministic=True))
-            done = terminated or truncated
             hits.append(info["is_success"])
-            if recorder and len(film) < shown:
+            done = terminated or truncated or len(hits) == steps
+            if recorder:
                 film.append(base.world.render())
                 zs.append(z)
                 parts.append(info["reward_parts"])
