@@ -111,6 +111,8 @@ def page(notebook: nbformat.NotebookNode, source: Path) -> str:
         if cell.cell_type == "markdown":
             cell.source = MATH.sub(lambda m: m[0] if m[1] else keep(m), cell.source)
         for output in list(cell.get("outputs", [])):
+            if "\r" in output.get("text", ""):  # a progress bar: as it stood at its end, and no error
+                output.text, output.name = re.sub(r"[^\n]*\r", "", output.text), "stdout"
             if GREETING.fullmatch(output.get("text", "")):
                 cell.outputs.remove(output)
     exporter = HTMLExporter(embed_images=True, mathjax_url="", require_js_url="")

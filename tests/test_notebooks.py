@@ -139,12 +139,14 @@ def test_a_page_of_the_book_needs_no_network_and_no_script_for_its_equations():
     notebook = nbformat.read(source, as_version=4)
     notebook.cells = [c for c in notebook.cells if c.cell_type == "markdown"]
     stream = nbformat.v4.new_output("stream", text="pybullet build time: Jan 29 2025\n")
-    notebook.cells.append(nbformat.v4.new_code_cell("import pybullet", outputs=[stream]))
+    bar = nbformat.v4.new_output("stream", name="stderr", text="\rpolicy 0%\rpolicy 50%\rpolicy 100%\n")
+    notebook.cells.append(nbformat.v4.new_code_cell("import pybullet", outputs=[stream, bar]))
     equations = sum(not m[1] for c in notebook.cells for m in MATH.finditer(c.source))
     html = page(notebook, source)
     assert not re.search(r"(?:src|href)=.https?://[^>]*(?:\.js|\.css|cdn)", html)
     assert html.count("<math") == equations > 10
     assert "EQUATION" not in html and "build time" not in html
+    assert "policy 100%" in html and "policy 50%" not in html
     assert all(f'href="{name}.html"' in html for name in ("index", SOURCES[0].stem, SOURCES[2].stem))
     assert 'id="plain"' in html
 
