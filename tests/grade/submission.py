@@ -11,8 +11,6 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
-from IPython.core.inputtransformer2 import TransformerManager
-
 from tests.grade.exercise import Exercise, everything
 
 MOST = 20 << 20  # bytes of a notebook; those of the course have 0.1 MB
@@ -80,6 +78,8 @@ def _plain(source) -> str:
     text = re.sub(r"\A\s*%%.*\n", "", text)  # such as %%time, above a cell that is Python
     if _parse(text):
         return text
+    from IPython.core.inputtransformer2 import TransformerManager  # slow, and seldom needed
+
     try:
         return TransformerManager().transform_cell(text)
     except Exception:  # whatever a stranger's text does to it

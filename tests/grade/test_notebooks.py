@@ -2,11 +2,10 @@
 
 import pytest
 
-from solutions.__main__ import NOTEBOOKS
 from tests.grade.__main__ import grade_one
 from tests.grade.exercise import everything
 from tests.grade.sandbox import Sandbox
-from tests.grade.submission import answer, read
+from tests.grade.submission import RELEASED, answer, read
 
 ALL = everything()
 
@@ -19,7 +18,7 @@ def box():
 
 @pytest.fixture(scope="module")
 def books():
-    return [read(path) for path in sorted(NOTEBOOKS.glob("*.ipynb"))]
+    return [read(path) for path in sorted(RELEASED.glob("*.ipynb"))]
 
 
 @pytest.mark.parametrize("exercise", ALL.values(), ids=list(ALL))
