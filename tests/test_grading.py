@@ -110,7 +110,7 @@ BAD = {
     "endless recursion": ("def r1(z, z_E):\n    return r1(z, z_E)", 0),
     "crashes Python": ("import ctypes\nctypes.string_at(0)", 0),
     "a list that holds itself": ("def r1(z, z_E):\n    x = []\n    x.append(x)\n    return x", 0),
-    "no Python": ("this is not Python", 0),
+    "no Python": ("this is no Python", 0),
     "a thread that stays": (
         "import threading, time\nthreading.Thread(target=time.sleep, args=(10_000,)).start()\n" + RIGHT,
         E61.points,
@@ -198,6 +198,11 @@ def test_a_bad_answer_gets_what_it_is_worth_and_the_others_count(class_of_cheats
 
 def test_the_honest_student_of_that_class_has_all_points(class_of_cheats):
     assert class_of_cheats["good"][:2] == (E61.points, REST)
+
+
+def test_what_a_cell_could_not_get_is_said(class_of_cheats):
+    for name in ("opens a socket", "starts a program"):
+        assert "the cell had failed: PermissionError" in class_of_cheats[name][2]
 
 
 def test_importing_the_answer_gets_a_hint_that_says_so(class_of_cheats):

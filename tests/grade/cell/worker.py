@@ -204,7 +204,10 @@ def run(job: dict, answer) -> None:
         except BaseException as e:
             if isinstance(e, NameError) and isinstance(failed, ImportError):
                 e = failed  # what is missing was to be imported
-            value, changed = wire.Raised(type(e).__name__, str(e)[:1000]), False
+            text = str(e)[:1000]
+            if isinstance(e, NameError) and failed:
+                text += f" (the cell had failed: {type(failed).__name__}: {str(failed)[:200]})"
+            value, changed = wire.Raised(type(e).__name__, text), False
         answer([value, changed])
 
 
