@@ -174,7 +174,7 @@ def define(job: dict) -> tuple[dict, Exception | None]:
         failed = e
         space.pop(job["name"], None)
         kinds = ast.FunctionDef | ast.ClassDef | ast.Import | ast.ImportFrom | ast.Assign | ast.AnnAssign
-        for node in ast.parse(job["source"]).body:
+        for node in ast.parse(job["source"], "your cell").body:
             with contextlib.suppress(Exception):
                 if isinstance(node, kinds):
                     exec(compile(ast.Module([node], []), "your cell", "exec"), space)
