@@ -487,6 +487,20 @@ def test_a_flat_folder_is_a_class_unless_its_names_are_those_of_the_course(tmp_p
     }  # fmt: skip
 
 
+def test_one_students_marks_and_a_loose_notebook_do_not_stop_the_class(tmp_path):
+    strange = copy.deepcopy(SOLVED)
+    for grade_id, source in (("ex-99-1", "x = 1"), (["ex-6-1"], "y = 1"), ("z", "# Exercise 77.3\nz = 1")):
+        note = {"nbgrader": {"grade_id": grade_id}}
+        strange["cells"].append({"cell_type": "code", "metadata": note, "source": source})
+    write(tmp_path / "class", "ann", strange)
+    write(tmp_path / "class", "bob", SOLVED)
+    (tmp_path / "class" / "06_reward.ipynb").write_text(json.dumps(SOLVED))
+    assert main([str(tmp_path / "class"), "--out", str(tmp_path / "out")]) == 0
+    assert {name: sum(g[:2]) for name, g in grades(tmp_path / "out").items()} == {
+        "ann": FULL, "bob": FULL, "06_reward.ipynb": FULL,
+    }  # fmt: skip
+
+
 def test_an_interrupted_grading_says_how_to_go_on(tmp_path, monkeypatch, capsys):
     def interrupted(*_):
         raise KeyboardInterrupt

@@ -91,8 +91,8 @@ def submissions(folder: Path, out: Path) -> list[Path]:
         raise ValueError(f"{folder}: no such folder")
     if not folder.is_dir() and folder.suffix != ".ipynb":
         raise ValueError(f"{folder}: neither a folder nor a notebook; unpack an archive first")
-    loose = {path.name for path in folder.glob("*.ipynb")} if folder.is_dir() else {folder.name}
-    if folder.is_file() or (loose and loose <= {path.name for path in RELEASED.glob("*.ipynb")}):
+    inside = {path.relative_to(folder) for path in notebooks(folder)}
+    if folder.is_file() or (inside and inside <= {path.relative_to(RELEASED) for path in RELEASED.glob("*")}):
         print(f"{folder} is graded as one submission")
         return [folder]
     found = sorted(p for p in folder.iterdir() if not hidden(p) and p.resolve() != out.resolve())

@@ -25,10 +25,19 @@ class Unreadable(Exception):
 
 @dataclass
 class Cell:
-    """A code cell. exercise: the id of the one it is marked for, by grade id or its first line; or ""."""
+    """A code cell. exercise: the id of the one it is marked for, by grade id or its first line; or "".
+
+    body: its top-level statements, but for functions and classes as they were handed out; none if it does
+    not parse. defines: the names these define.
+    """
 
     source: str
     exercise: str
+
+    def __post_init__(self):
+        tree = _parse(self.source)
+        self.body = [node for node in (tree.body if tree else []) if not _is_stub(node)]
+        self.defines = set().union(*map(_defined, self.body))
 
 
 @dataclass
@@ -42,7 +51,7 @@ class Notebook:
     def __post_init__(self):
         votes = Counter(c.exercise.split(".")[0] for c in self.cells if c.exercise)
         for e in everything().values():
-            votes[e.id.split(".")[0]] += any(_defines(c.source, e.name) for c in self.cells)
+            votes[e.id.split(".")[0]] += any(e.name in c.defines for c in self.cells)
         self.number = max(votes, key=votes.get) if votes.total() else ""
 
 
@@ -66,10 +75,10 @@ def _marked(cell, source: str) -> str:
     """The exercise a cell is marked for."""
     note = cell.get("metadata", {}).get("nbgrader", {})
     grade_id = note.get("grade_id") if isinstance(note, dict) else None
-    if isinstance(grade_id, str) and (found := re.fullmatch(r"ex-(\d+)-(\d+)", grade_id)):
-        return ".".join(found.groups())
-    found = re.match(r"#\s*Exercise (\d+\.\d+)\b", source)
-    return found[1] if found else ""
+    title = re.match(r"#\s*Exercise (\d+\.\d+)\b", source)
+    known = everything()
+    by_title = title[1] if title and title[1] in known else ""
+    return next((id for id, e in known.items() if e.grade_id == grade_id), by_title)
 
 
 def _plain(source) -> str:
@@ -135,12 +144,6 @@ def _busy(value) -> bool:
     return any(map(_busy, ast.iter_child_nodes(value)))
 
 
-def _defines(source: str, name: str) -> bool:
-    """Whether a cell defines a name, with more than was handed out."""
-    tree = _parse(source)
-    return bool(tree) and any(name in _defined(node) and not _is_stub(node) for node in tree.body)
-
-
 @dataclass
 class Answer:
     """The cell that answers an exercise, the definitions of other cells that it uses, and where it stands."""
@@ -163,8 +166,8 @@ def answer(exercise: Exercise, books: list[Notebook]) -> Answer | None:
     cells = [(book, i, cell) for book in books for i, cell in enumerate(book.cells)]
     marked = [place for place in cells if place[2].exercise == exercise.id]
     others = [place for place in cells if not place[2].exercise and place[0].number == number]
-    done = [place for place in marked if _defines(place[2].source, exercise.name)]
-    found = done or [p for p in others if _defines(p[2].source, exercise.name)] or marked
+    done = [place for place in marked if exercise.name in place[2].defines]
+    found = done or [place for place in others if exercise.name in place[2].defines] or marked
     if not found:
         return None
     book, i, cell = found[-1]
@@ -183,8 +186,7 @@ def _helpers(cells: list[Cell], own: int, exercise: Exercise) -> list[str]:
         known |= {name for node in getattr(_parse(text), "body", []) for name in _defined(node)}
     offers = []  # (cell, names, text)
     for i, cell in enumerate(cells):
-        tree = _parse(cell.source) if i != own else None
-        offers += [(i, _defined(n), ast.unparse(n)) for n in (tree.body if tree else []) if not _is_stub(n)]
+        offers += [(i, _defined(n), ast.unparse(n)) for n in cell.body if i != own]
     wanted = _names(source) - known
     taken = {k for k, (_, names, _) in enumerate(offers) if "*" in names}
     while wanted:
