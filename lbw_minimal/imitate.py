@@ -127,13 +127,15 @@ def learn_perception(demo, random, robot, recipe, *, task, seed, run, device="cp
 def watched(env, perception: Perception, robot, form="mended", without=None):
     """`env` as the paper's agent sees it, observing keypoints and earning r_t, and its `KeypointReward`.
 
+    Long after the demonstration's end nothing is left to do: episodes are shorter than a long horizon.
     `perception` has watched the demonstration; the other arguments are those of `imitate`.
     """
     switches = {without: False} if without else {}
     horizon = env.spec.max_episode_steps
     z_robot = perception.detect(robot[:PACE])
     reward = KeypointReward(perception.z_E, z_robot, form=form, horizon=horizon, **switches)
-    return KeypointRewardWrapper(KeypointObservation(env, perception.detect), reward), reward
+    env = KeypointRewardWrapper(KeypointObservation(env, perception.detect), reward)
+    return TimeLimit(env, min(horizon, reward.episode)), reward
 
 
 def imitate(
@@ -146,15 +148,13 @@ def imitate(
     to leave out. Returns the agent and `env` wrapped so that its observations are the policy's.
     """
     perception.watch(demo)
-    env, reward = watched(env, perception, robot, form, without)
-    # Long after the demonstration's end nothing is left to learn: practise in shorter episodes.
-    practice = TimeLimit(env, min(env.spec.max_episode_steps, reward.episode))
+    env, _ = watched(env, perception, robot, form, without)
     path = run.out / "policy.safetensors"
     if path.exists():
         agent = sac.load(path)
     else:
         with run.stage("policy") as checkpoint:
-            agent, log = sac.train(practice, steps=recipe.policy_steps, seed=seed, checkpoint=checkpoint)
+            agent, log = sac.train(env, steps=recipe.policy_steps, seed=seed, checkpoint=checkpoint)
             run.log("policy_log", log)
             sac.save(path, agent)
     return agent, env

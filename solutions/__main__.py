@@ -89,14 +89,16 @@ def execute(source: Path) -> nbformat.NotebookNode:
     return notebook
 
 
-def mathml(text: str) -> str:
-    """Text with its equations as MathML, which browsers show without a script from the network."""
-    return MATH.sub(lambda m: m[1] or convert(m[2] or m[3], display="block" if m[2] else "inline"), text)
+def mathml(found: re.Match) -> str:
+    """What `MATH` found as MathML, which browsers show without a script from the network; code as it is."""
+    return found[1] or convert(found[2] or found[3], display="block" if found[2] else "inline")
 
 
-def title(source: Path) -> str:
-    """The notebook's first line."""
-    return nbformat.read(source, as_version=4).cells[0].source.splitlines()[0].lstrip("# ")
+def opening(source: Path) -> tuple[str, str]:
+    """The notebook's title and its question, with equations as MathML."""
+    text = nbformat.read(source, as_version=4).cells[0].source
+    question = text.split("**The question.**")[1].split("\n\n")[0].strip().replace("*", "")
+    return text.splitlines()[0].lstrip("# "), MATH.sub(mathml, question)
 
 
 def page(notebook: nbformat.NotebookNode, source: Path) -> str:
@@ -104,12 +106,14 @@ def page(notebook: nbformat.NotebookNode, source: Path) -> str:
     equations = []
 
     def keep(found):  # the exporter would take MathML apart
-        equations.append(mathml(found[0]))
+        if found[1]:
+            return found[1]
+        equations.append(mathml(found))
         return f"EQUATION{len(equations) - 1}HERE"
 
     for cell in notebook.cells:
         if cell.cell_type == "markdown":
-            cell.source = MATH.sub(lambda m: m[0] if m[1] else keep(m), cell.source)
+            cell.source = MATH.sub(keep, cell.source)
         for output in list(cell.get("outputs", [])):
             if "\r" in output.get("text", ""):  # a progress bar: as it stood at its end, and no error
                 output.text, output.name = re.sub(r"[^\n]*\r", "", output.text), "stdout"
@@ -117,15 +121,14 @@ def page(notebook: nbformat.NotebookNode, source: Path) -> str:
                 cell.outputs.remove(output)
     exporter = HTMLExporter(embed_images=True, mathjax_url="", require_js_url="")
     exporter.exclude_anchor_links = True
-    html, _ = exporter.from_notebook_node(notebook, {"metadata": {"name": escape(title(source))}})
+    html, _ = exporter.from_notebook_node(notebook, {"metadata": {"name": escape(opening(source)[0])}})
     html = re.sub(r'<script type="module">.*?</script>', "", html, flags=re.DOTALL)  # mermaid, from a network
     html = re.sub(r"EQUATION(\d+)HERE", lambda m: equations[int(m[1])], html)
     order = sources()
     i = order.index(source)
     links = ['<a href="index.html">contents</a>']
-    links += [
-        f'<a href="{order[j].stem}.html">{title(order[j])}</a>' for j in (i - 1, i + 1) if 0 <= j < len(order)
-    ]
+    for near in (*order[max(0, i - 1) : i], *order[i + 1 : i + 2]):
+        links.append(f'<a href="{near.stem}.html">{opening(near)[0]}</a>')
     bar = f'<nav>{"".join(links)}<label><input type="checkbox" id="plain"> hide the code</label></nav>'
     html = html.replace("</head>", f"<style>{STYLE}</style></head>", 1)
     return re.sub(r"(<body[^>]*>)", lambda found: found[1] + bar, html, count=1)
@@ -135,9 +138,8 @@ def contents() -> str:
     """The page that lists all notebooks with their questions."""
     rows = []
     for source in sources():
-        question = nbformat.read(source, as_version=4).cells[0].source.split("**The question.**")[1]
-        question = mathml(question.split("\n\n")[0].strip().replace("*", ""))
-        rows.append(f'<li><a href="{source.stem}.html">{title(source)}</a><p>{question}</p></li>')
+        title, question = opening(source)
+        rows.append(f'<li><a href="{source.stem}.html">{title}</a><p>{question}</p></li>')
     return (
         f'<!doctype html><html lang="en"><meta charset="utf-8"><title>LbW minimal, the course</title>'
         f"<style>{INDEX}</style><h1>LbW minimal, the course</h1><ul>{''.join(rows)}</ul></html>\n"

@@ -57,10 +57,8 @@ def write(out: Path) -> Path:
         perception.watch(demo)
         robot, _ = record_random(gym.make(tasks.id_of(name)).unwrapped, PACE, seed=0)
         agent = sac.load(tasks.WEIGHTS / name / "policy.safetensors")
-        env, reward = watched(gym.make(tasks.id_of(name)), perception, robot)
-        frames, z, won = rollout(
-            env, agent, min(env.spec.max_episode_steps, reward.episode), out / f"{name}-robot.html"
-        )
+        env, _ = watched(gym.make(tasks.id_of(name)), perception, robot)
+        frames, z, won = rollout(env, agent, out / f"{name}-robot.html")
         perform(gym.make(tasks.id_of(name), embodiment="human").unwrapped, out / f"{name}-human.html")
         shown = data_uri("image/webp", film(draw_keypoints(frames, z), FPS / 2))
         scenes = [
@@ -78,14 +76,14 @@ def write(out: Path) -> Path:
     return out / "index.html"
 
 
-def rollout(env, agent, steps, path):
+def rollout(env, agent, path):
     """Frames, keypoints and success of one episode of the policy, whose 3-D scene goes to a file."""
     obs, _ = env.reset(seed=SEED)
     base, K = env.unwrapped, env.get_wrapper_attr("keypoint_reward").z_E.shape[1]
-    frames, z, won, scene = [], [], False, mirror(base)
+    frames, z, won, over, scene = [], [], False, False, mirror(base)
     scene.snap()
-    for _ in range(steps):
-        obs, _, _, _, info = env.step(agent.act(obs, deterministic=True))
+    while not over:
+        obs, _, _, over, info = env.step(agent.act(obs, deterministic=True))
         frames.append(base.world.render())
         z.append(obs[: 2 * K].reshape(K, 2))
         won |= info["is_success"]

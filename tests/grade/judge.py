@@ -136,12 +136,12 @@ def _same(check: Check, got, theirs, want) -> bool:
 
 
 EXACT = Check("", lambda rng: (), 0, 1e-6, 1e-6, 1, None)
+LOOSE = Check("", lambda rng: (), 0, 1e-5, 1e-4, 1, None)  # as a check, where it names no tolerances
 
 
 def _all_same(values) -> bool:
     """Whether values are equal, but for what a check would not notice."""
-    loose = Check("", lambda rng: (), 0, 1e-5, 1e-4, 1, None)
-    return not any(different(v, values[0], loose) for v in values)
+    return not any(different(v, values[0], LOOSE) for v in values)
 
 
 def _repeat(known, call, renew) -> str:
