@@ -164,7 +164,7 @@ def parts(rows: list[dict], fps: float = 25, success: int | None = None) -> Figu
         if success:
             axis.axvline(success / fps, color="black", lw=1)
             axis.annotate(" task done", (success / fps, 0.03), xycoords=("data", "axes fraction"), fontsize=9)
-        axis.set(xlabel="time in the episode (s)", ylabel="reward a step")
+        axis.set(xlabel="time in the episode (s)", ylabel="part of the reward a step")
         axis.set_ylim(top=max(0, axis.get_ylim()[1]))  # 0 is the best there is
         figure.legend(loc="outside upper center", ncols=4)
     return figure
@@ -239,9 +239,10 @@ makes them learn. Success is only counted here; it is no part of the reward.</p>
 """
 
 REWARD = """
-<p>What the robot earned at each step of the test episode: r1 for being where the demonstration is, r2 for
-moving as the demonstration moves. Both are at most 0, and 0 means exactly as in the demonstration. Look for
-r1 to stay near 0, or to come back to it, until the end.</p>
+<p>The two parts of what the robot earned at each step of the test episode: r1 for being where the
+demonstration is, r2 for moving as the demonstration moves. In the sum r2 counts three times. Both are at
+most 0, and 0 means exactly as in the demonstration. Look for r1 to stay near 0, or to come back to it, until
+the end.</p>
 """
 
 PERCEPTION = """
@@ -343,7 +344,7 @@ def headline(task, metrics, form):
 
 
 def demonstration(demo, translated, z_demo, fps):
-    """The paper's Fig. 3: human frames above their translations, in columns that wrap on a narrow screen."""
+    """As the paper's Fig. 5: human frames above their translations, in columns that wrap when narrow."""
     i, columns = spread(len(demo), 8), []
     pairs = np.concatenate([enlarge(demo[i], 3), draw_keypoints(translated[i], z_demo[i], 3)], axis=1)
     for t, both in zip(i, pairs, strict=True):

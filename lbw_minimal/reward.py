@@ -30,7 +30,7 @@ def _median_step(z):
 
 
 def _top_step(z):
-    # 90th percentile: resets of a random video, one frame in twenty, stay out.
+    # 90th percentile: resets of a random video, one frame in twenty-five, stay out.
     return float(np.quantile(np.linalg.norm(_steps(z), axis=1), 0.9))
 
 
@@ -77,15 +77,16 @@ class KeypointReward:
     """r_t = lambda_r1 r1(t) + lambda_r2 r2(t), Eq. 8. A pure function of z_t, z_{t+1} and, if `timed`, t.
 
     trajectory: z^E (N, K, 2) in [-1, 1], N >= 3. robot: keypoints (M, K, 2) of the robot's random
-    video, which the mended form needs for the robot's pace. horizon: steps of an episode; the prepared
-    demonstration takes at most 70 % of it. lam: (lambda_r1, lambda_r2).
+    video, which the mended form needs for the robot's pace. horizon: the most steps an episode may have; with
+    `speed` the prepared demonstration takes at most 70 % of it. lam: (lambda_r1, lambda_r2).
 
     The mends: `trim` cuts pauses, which make idling look like the skill; `speed` slows the
-    demonstration down to the robot's pace where it is faster; `include_goal` lets p reach N; `timed` takes
-    p = q = t instead of the nearest frame, so that falling behind costs. The mended reward also judges
-    z_{t+1}, which a_t can still change, where Eq. 9 judges z_t, and takes the mean length over keypoints,
-    each capped at twice the mean path: a lost keypoint costs a bounded share. Its unit: r1 = -1 is an arm
-    that never moved, seen at the end. It lies in [-2 sum(lam), 0].
+    demonstration down to the robot's pace where it is faster, and hurries one that takes more than its
+    share of the horizon; `include_goal` lets p reach N; `timed` takes q = t and p = t + 1 instead of the
+    nearest frames, so that falling behind costs. The mended reward also judges z_{t+1}, which a_t can
+    still change, where Eq. 9 judges z_t, and takes the mean length over keypoints, each capped at twice
+    the mean path: a lost keypoint costs a bounded share. Its unit: r1 = -1 is an arm that never moved, seen
+    at the end, if the demonstration ends farthest from its start. It lies in [-2 sum(lam), 0].
 
     Raises InputError where shapes do not fit or nothing moves in the demonstration.
     """

@@ -2,9 +2,9 @@
 
 In: a Gymnasium environment with vector observations and actions in [-1, 1]. Out: a policy and a log
 with a row an episode. Not in the publication: LayerNorm in the critics (keeps Q from running away when
-steps are few), running normalisation of observations, a learning rate that falls towards the end, an
-averaged actor that acts at test time while the raw one explores, and a last round without noise in which
-the best actors of the training compete.
+steps are few), running normalisation of observations, four updates a step, a lower target entropy, a
+learning rate that falls towards the end, an averaged copy of the actor, and a last round without noise in
+which raw and averaged actors of the best episodes compete for acting at test time.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from torch import nn
 from .training import Checkpoint, load_state, progress, save_state, seed_everything
 
 LOG_STD_MIN, LOG_STD_MAX = -5.0, 2.0  # exp(-5) acts as good as deterministic; exp(2) is past tanh's ends
-ENTROPY = -2.0  # aimed at, per action; the published -1 is noise of 0.09, too much to dose a hit within 5 %
+ENTROPY = -2.0  # aimed at, per number of an action; the published -1 is noise of 0.09, too much to dose a hit
 WINDOW = 10  # episodes whose mean return makes the actors at their end candidates
 CANDIDATES = 4  # windows that are kept: training goes up and down
 TRIALS = 5  # episodes without noise for each candidate; with noise an actor may dose a hit, without overshoot
@@ -114,8 +114,8 @@ class SAC:
 
     obs_dim, action_dim: sizes of the vectors; actions are in [-1, 1]. gamma: discount; 0.95 looks 20
     steps ahead, enough for a reward that is paid at every step. tau: pace of the target critics.
-    alpha: first temperature, for rewards of about 1 a step. average: pace of the test-time actor,
-    500 updates.
+    alpha: first temperature, for rewards of about 1 a step. average: pace of `test_actor`, the actor's
+    mean over some 500 updates, until `train` puts the best one there.
     """
 
     def __init__(
@@ -173,7 +173,7 @@ class SAC:
 
     @torch.no_grad()
     def act(self, obs, deterministic: bool = False) -> np.ndarray:
-        """Action (A,) float32 in [-1, 1] for an observation (S,): a sample, or the averaged actor's mean."""
+        """Action (A,) float32 in [-1, 1] for an observation (S,): a sample, or the test actor's mean."""
         s = self.normalise(torch.as_tensor(obs, dtype=torch.float32))
         a = torch.tanh(self.test_actor(s)[0]) if deterministic else self.actor.sample(s)[0]
         return a.numpy()
@@ -259,9 +259,9 @@ def train(
     """Train on `env` until the first episode that ends at or after `steps` environment steps.
 
     env: observations (S,) float32, actions (A,) in [-1, 1]. Its `info["reward_parts"]` and
-    `info["is_success"]` go to the log and nowhere else. updates: gradient steps an environment step,
-    after `random_steps` uniformly random ones. evaluate(sac) -> dict joins the log every
-    `evaluate_every` episodes. recipe: arguments of `SAC`. Returns the agent and the log, a row an
+    `info["is_success"]`, that of an episode's last step, go to the log and nowhere else. updates: gradient
+    steps an environment step, after `random_steps` uniformly random ones. evaluate(sac) -> dict joins the log
+    every `evaluate_every` episodes. recipe: arguments of `SAC`. Returns the agent and the log, a row an
     episode. A resumed run does what the killed one would have done: each episode starts from
     (seed, episode), and checkpoints are taken between episodes. The agent's test-time actor is chosen at
     the end, by return: see `best_actor`.

@@ -36,11 +36,11 @@ class KeypointRewardWrapper(gym.Wrapper):
     coordinates: (z_t, z_t - z_{t-1}, z_{t-1} - z_{t-2}, z^E_{t+1} - z_t, clock), (8K + 1,): where everything
     is, how it moved in the last step and in the one before, the way to where the demonstration will be, and
     how much of that has passed, 0 to 1. The clock alone would do in theory, but then the agent has to learn
-    the demonstration by heart: on push, seed 0, it had not solved the task after 4,000 steps, with the way it
-    first did after 2,500. How things move decides a hit: on slide, one perception, without it 0 of 10 pucks
-    stopped at the target, with it 10. The step before tells where the tip is drawn to: its goal leads it,
-    and no frame shows a goal. Without it another perception's pucks ended 5 cm too far, 3 of 10 at the
-    target; with it 10.
+    the demonstration by heart: on push, seed 0, with one update a step and no look back, it had not solved
+    the task after 4,000 steps, with the way it first did after 2,500. How things move decides a hit: on
+    slide, one perception, without it 0 of 10 pucks stopped at the target, with it 10. The step before tells
+    where the tip is drawn to: its goal leads it, and no frame shows a goal. Without it another perception's
+    pucks ended 5 cm too far, 3 of 10 at the target; with it 10.
     """
 
     def __init__(self, env: gym.Env, reward):

@@ -4,7 +4,7 @@ python -m tasks TASK      learn TASK from its human video, evaluate, write runs/
 python -m tasks record T  film the human videos of task T again
 python -m tasks table     the results of all tasks; what is missing is run first
 python -m tasks ablation  what each mend of the reward is worth
-python -m tasks gallery   one page with every task's scene, demonstration and best rollout
+python -m tasks gallery   one page with every task's scene, demonstration and rollout
 python -m tasks bench     steps, iterations and updates a second on this machine
 """
 

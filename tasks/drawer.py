@@ -80,7 +80,7 @@ class Drawer(TaskEnv):
         return [
             Leg(before, 0.9),
             Leg(end, 1.6),
-            Leg(end, 0.2),  # the tip lags its goal by 2 / 20 s
+            Leg(end, 0.2),  # the tip lags its goal by 2 / 40 s
         ]
 
 

@@ -1,4 +1,4 @@
-"""One page that shows all tasks: scene, demonstration, what the robot saw in it, and the best rollout.
+"""One page that shows all tasks: scene, demonstration, what the robot saw in it, and a rollout.
 
 In: the human videos and the trained weights that come with the kit. Out: `index.html` with the pictures in
 it, and beside it a scene for every task and arm that turns with the mouse, each a file of its own.

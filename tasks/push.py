@@ -1,7 +1,7 @@
 """Push: a cube lies on the table, and its centre has to end at the target 15 cm further on.
 
 Success, horizon and sizes follow the Fetch push task the paper builds on; the cube is red as in the
-paper's Figure 4. From top to bottom: constants, scene, success, the expert, the recipe.
+paper's Figure 5. From top to bottom: constants, scene, success, the expert, the recipe.
 """
 
 from __future__ import annotations

@@ -267,7 +267,7 @@ evaluate.check(
     lambda rng: (np.pad(np.zeros((6, 11), bool), ((0, 0), (0, 1)), constant_values=True),),
 )
 evaluate.mistake(
-    "Success counts at any step within the horizon; you ask for the last one.",
+    "Success counts at any step of the episode; you ask for the last one.",
     "any(play(1_000_000 + i))",
     "play(1_000_000 + i)[-1]",
 )
@@ -282,9 +282,7 @@ evaluate.mistake(
     "sum(any(play(1_000_000 + i)) for i in range(n)) / n",
 )
 evaluate.mistake("Solved at any step, not at all of them.", "any(play", "all(play")
-evaluate.mistake(
-    "Those seeds belong to the training; test episodes start at 1,000,000.", "1_000_000 + i", "i"
-)
+evaluate.mistake("Test episodes have seeds of their own: they start at 1,000,000.", "1_000_000 + i", "i")
 evaluate.mistake(
     "You play one episode again and again: each needs a seed of its own.", "1_000_000 + i", "1_000_000"
 )
