@@ -1,11 +1,18 @@
 """The tables: figures worked out by hand, finished runs left alone, failed ones named."""
 
+import dataclasses
 import json
+import shutil
+from importlib import import_module
+from pathlib import Path
 
 import pytest
 
 from lbw_minimal.training import InputError
 from tasks import table
+
+ROOT = Path(__file__).parents[1]
+RESULTS = ROOT / "solutions" / "results"
 
 
 def finish(path, wins, episodes=10, **more):
@@ -74,3 +81,23 @@ def test_a_run_that_fails_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr("subprocess.run", lambda *a, **k: type("Done", (), {"returncode": 2}))
     with pytest.raises(InputError, match=r"push-0.*code 2"):
         table.run_missing(tmp_path, [("push", 0, "")], jobs=1)
+
+
+@pytest.mark.parametrize("path", sorted((RESULTS / "runs").iterdir()), ids=lambda p: p.name)
+def test_shipped_run_is_of_the_present_recipe(path):
+    settings = json.loads((path / "metrics.json").read_text())["settings"]
+    recipe = import_module(f"tasks.{settings['task']}").RECIPE
+    assert settings["recipe"] == dataclasses.asdict(recipe)
+    change = settings["without"] or settings["reward"].replace("mended", "")
+    assert table.folder(path.parent, settings["task"], settings["seed"], change) == path
+
+
+def test_shipped_tables_are_those_of_the_shipped_runs(tmp_path, monkeypatch):
+    out = shutil.copytree(RESULTS / "runs", tmp_path / "table")
+    monkeypatch.setattr("subprocess.run", lambda *_, **__: pytest.fail("a run is missing"))
+    readme = (ROOT / "README.md").read_text()
+    for name, make in (("table", table.table), ("ablation", table.ablation)):
+        assert make(out, jobs=1) == (RESULTS / f"{name}.md").read_text()
+        assert (out / f"{name}.json").read_text() == (RESULTS / f"{name}.json").read_text()
+        for part in (RESULTS / f"{name}.md").read_text().split("\n\n"):
+            assert part.strip() in readme
