@@ -66,6 +66,7 @@ def parse(argv):
     parser.add_argument("--from-scratch", action="store_true", help="train perception too")
     parser.add_argument("--weights", type=Path, help="folder with trained weights (the shipped ones)")
     parser.add_argument("--evaluate", action="store_true", help="only replay the shipped policy")
+    parser.add_argument("--episodes", type=int, help=f"test episodes ({TEST_EPISODES})")
     parser.add_argument("--resume", action="store_true", help="go on with the run in --out")
     parser.add_argument("--fast", action="store_true", help="a smoke run through every stage")
     args = parser.parse_args(argv)
@@ -107,6 +108,8 @@ def run(args):
     recipe = dataclasses.replace(module.RECIPE, **FAST) if args.fast else module.RECIPE
     if args.reward == "literal" and args.without:
         raise InputError(f"--without {args.without}: the literal reward has no mends; leave one of the two.")
+    if args.episodes is not None and args.episodes < 1:
+        raise InputError(f"--episodes {args.episodes}: play at least one.")
     pick_device(args.device)  # say so before anything else if there is none
     torch.set_num_threads(args.threads or os.cpu_count())
     from_scratch = args.from_scratch or args.fast or args.video is not None
@@ -154,7 +157,7 @@ def run(args):
     if from_scratch and args.video is None and "perception" not in here.metrics:
         here.metrics["perception"] = probe(tasks.id_of(name), perception, PROBE_SEED + args.seed)
 
-    episodes, first, scene = evaluate(agent, env, 2 if args.fast else TEST_EPISODES)
+    episodes, first, scene = evaluate(agent, env, args.episodes or (2 if args.fast else TEST_EPISODES))
     here.metrics["episodes"] = episodes
     wins, n = sum(e["success"] for e in episodes), len(episodes)
     low, high = wilson(wins, n)

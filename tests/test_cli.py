@@ -1,5 +1,6 @@
 """The command line: what a user does wrong gets one sentence, exit code 2, and leaves no trace."""
 
+import json
 import shutil
 
 import cv2
@@ -100,9 +101,13 @@ def literal_without_a_mend(folder):
     return ["push", "--reward", "literal", "--without", "trim"], "trim"
 
 
+def no_episodes(folder):
+    return ["push", "--evaluate", "--episodes", "0"], "--episodes 0"
+
+
 MISTAKES = (missing, text, truncated, no_frames, one_frame, tiny, still, unknown_task, unknown_task_to_film,
             no_task_to_film, nothing_to_resume, other_tasks_weights, cut_weights, no_weights, no_cuda,
-            no_such_device, literal_without_a_mend)  # fmt: skip
+            no_such_device, literal_without_a_mend, no_episodes)  # fmt: skip
 
 
 @pytest.mark.parametrize("mistake", MISTAKES, ids=lambda f: f.__name__)
@@ -118,6 +123,14 @@ def test_a_mistake_gets_one_sentence_and_leaves_no_trace(mistake, tmp_path, capf
     assert err.startswith("error: ") and err.count("\n") == 1, err
     assert culprit in err and err.rstrip().endswith(".")
     assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_the_shipped_policy_is_replayed_for_as_many_episodes_as_asked(tmp_path, capfd):
+    assert main(["push", "--evaluate", "--episodes", "2", "--out", str(tmp_path)]) == 0
+    assert "push: 2/2 successes" in capfd.readouterr().out
+    metrics = json.loads((tmp_path / "metrics.json").read_text())
+    assert [e["seed"] for e in metrics["episodes"]] == [1_000_000, 1_000_001]
+    assert "A test episode" in (tmp_path / "report.html").read_text()
 
 
 @pytest.mark.parametrize("what", [["push", "--fast"], ["table"], ["ablation"], ["gallery"]])
