@@ -101,3 +101,18 @@ def test_shipped_tables_are_those_of_the_shipped_runs(tmp_path, monkeypatch):
         assert (out / f"{name}.json").read_text() == (RESULTS / f"{name}.json").read_text()
         for part in (RESULTS / f"{name}.md").read_text().split("\n\n"):
             assert part.strip() in readme
+
+
+def test_repeated_runs_are_of_the_present_recipe_and_as_good_as_the_readme_says():
+    wins = {}
+    for path in sorted((RESULTS / "again").iterdir()) + sorted((RESULTS / "hundred").iterdir()):
+        metrics = json.loads(path.read_text())
+        settings = metrics["settings"]
+        assert settings["recipe"] == dataclasses.asdict(import_module(f"tasks.{settings['task']}").RECIPE)
+        wins[path.parent.name, path.stem] = [e["success"] for e in metrics["episodes"]]
+    again, hundred = ({k[1]: v for k, v in wins.items() if k[0] == kind} for kind in ("again", "hundred"))
+    assert len(again) == 7 and all(len(won) == sum(won) == 10 for won in again.values())
+    assert len(hundred) == 12 and all(len(won) == 100 for won in hundred.values())
+    slide = ["slide", *(f"slide-again-{seed}" for seed in range(3))]
+    assert [sum(hundred.pop(name)) for name in slide] == [97, 96, 96, 100]
+    assert all(all(won) for won in hundred.values())
