@@ -83,13 +83,26 @@ def test_a_run_that_fails_is_named(tmp_path, monkeypatch):
         table.run_missing(tmp_path, [("push", 0, "")], jobs=1)
 
 
-@pytest.mark.parametrize("path", sorted((RESULTS / "runs").iterdir()), ids=lambda p: p.name)
+def read(path):
+    return json.loads(path.read_text())
+
+
+RUNS = sorted((RESULTS / "runs").glob("*/metrics.json"))
+AGAIN, HUNDRED = (sorted((RESULTS / name).glob("*.json")) for name in ("again", "hundred"))
+
+
+@pytest.mark.parametrize("path", RUNS + AGAIN + HUNDRED, ids=lambda p: str(p.relative_to(RESULTS)))
 def test_shipped_run_is_of_the_present_recipe(path):
-    settings = json.loads((path / "metrics.json").read_text())["settings"]
+    settings = read(path)["settings"]
     recipe = import_module(f"tasks.{settings['task']}").RECIPE
     assert settings["recipe"] == dataclasses.asdict(recipe)
+
+
+@pytest.mark.parametrize("path", RUNS, ids=lambda p: p.parent.name)
+def test_shipped_run_is_in_the_folder_of_its_settings(path):
+    settings = read(path)["settings"]
     change = settings["without"] or settings["reward"].replace("mended", "")
-    assert table.folder(path.parent, settings["task"], settings["seed"], change) == path
+    assert table.folder(RESULTS / "runs", settings["task"], settings["seed"], change) == path.parent
 
 
 def test_shipped_tables_are_those_of_the_shipped_runs(tmp_path, monkeypatch):
@@ -103,14 +116,11 @@ def test_shipped_tables_are_those_of_the_shipped_runs(tmp_path, monkeypatch):
             assert part.strip() in readme
 
 
-def test_repeated_runs_are_of_the_present_recipe_and_as_good_as_the_readme_says():
-    wins = {}
-    for path in sorted((RESULTS / "again").iterdir()) + sorted((RESULTS / "hundred").iterdir()):
-        metrics = json.loads(path.read_text())
-        settings = metrics["settings"]
-        assert settings["recipe"] == dataclasses.asdict(import_module(f"tasks.{settings['task']}").RECIPE)
-        wins[path.parent.name, path.stem] = [e["success"] for e in metrics["episodes"]]
-    again, hundred = ({k[1]: v for k, v in wins.items() if k[0] == kind} for kind in ("again", "hundred"))
+def test_repeated_runs_are_as_good_as_the_readme_says():
+    again, hundred = (
+        {path.stem: [e["success"] for e in read(path)["episodes"]] for path in paths}
+        for paths in (AGAIN, HUNDRED)
+    )
     assert len(again) == 7 and all(len(won) == sum(won) == 10 for won in again.values())
     assert len(hundred) == 12 and all(len(won) == 100 for won in hundred.values())
     slide = ["slide", *(f"slide-again-{seed}" for seed in range(3))]
