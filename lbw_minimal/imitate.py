@@ -1,9 +1,10 @@
 """Learning by Watching, the whole method: one human video in, a policy out.
 
-    translate (Eq. 1-5)  ->  detect keypoints (Eq. 6-7)  ->  reward (Eq. 8-10)  ->  soft actor-critic
+    translate (Eq. 1-5)  ->  detect keypoints (Eq. 6-7)  ->  reward (Eq. 8-10)  ->  soft
+    actor-critic
 
-Every stage leaves its result as a file in the run's folder and is skipped where that file exists, so
-a run that was killed goes on where it was. Frames are all that any stage learns from.
+Every stage leaves its result as a file in the run's folder and is skipped where that file exists,
+so a run that was killed goes on where it was. Frames are all that any stage learns from.
 """
 
 from __future__ import annotations
@@ -22,7 +23,8 @@ from lbw_minimal.reward import KeypointReward
 from lbw_minimal.training import Checkpoint, write_atomic
 from lbw_minimal.wrappers import KeypointObservation, KeypointRewardWrapper
 
-PACE = 400  # frames of random robot motion that show its pace; so few are filmed again in a second or two,
+# frames of random robot motion that show its pace; so few are filmed again in a second or two,
+PACE = 400
 # and a policy is followed up with the very reward it was trained on
 
 
@@ -36,12 +38,14 @@ class Recipe:
     munit_width: int = 20  # channels of the first layer
     transporter_iterations: int = 600
     K: int = 5  # keypoints
-    policy_steps: int = 5_000  # environment steps of SAC; most tasks are solved every time from 2,000 on
+    # environment steps of SAC; most tasks are solved every time from 2,000 on
+    policy_steps: int = 5_000
 
 
 @dataclass
 class Perception:
-    """The trained translator T and keypoint detector Psi, with what they make of the demonstration."""
+    """The trained translator T and keypoint detector Psi, with what they make of the
+    demonstration."""
 
     translator: munit.MUNIT
     style: torch.Tensor  # (style_dim,) the robot style that every human frame is given
@@ -54,7 +58,8 @@ class Perception:
         return munit.translate(self.translator, frames, self.style)
 
     def watch(self, demo: np.ndarray) -> None:
-        """Translate the demonstration (N, 84, 84, 3) uint8 and find its keypoint trajectory, once."""
+        """Translate the demonstration (N, 84, 84, 3) uint8 and find its keypoint trajectory,
+        once."""
         self.translated = self.translate(demo)  # v_1^E .. v_N^E
         self.z_E = self.detect(self.translated)  # z_1^E .. z_N^E
 
@@ -76,7 +81,8 @@ class Run:
 
     @contextmanager
     def stage(self, name: str):
-        """Lend a checkpoint to a training; when that is through, note its time and drop the file."""
+        """Lend a checkpoint to a training; when that is through, note its time and drop the
+        file."""
         checkpoint = Checkpoint(self.out / f"{name}.checkpoint")
         yield checkpoint
         self.metrics["stages"][name] = round(checkpoint.spent, 1)
@@ -98,7 +104,8 @@ def load_perception(folder: Path, task: str) -> Perception:
 
 
 def learn_perception(demo, random, robot, recipe, *, task, seed, run, device="cpu") -> Perception:
-    """Train T and Psi from human frames (demonstration and random motion) and random robot frames."""
+    """Train T and Psi from human frames (demonstration and random motion) and random robot
+    frames."""
     human = np.concatenate([demo, random])
     path = run.out / "translation.safetensors"
     if not path.exists():
@@ -125,10 +132,11 @@ def learn_perception(demo, random, robot, recipe, *, task, seed, run, device="cp
 
 
 def watched(env, perception: Perception, robot, form="mended", without=None):
-    """`env` as the paper's agent sees it, observing keypoints and earning r_t, and its `KeypointReward`.
+    """`env` as the paper's agent sees it, observing keypoints and earning r_t, and its
+    `KeypointReward`.
 
-    Long after the demonstration's end nothing is left to do: episodes are shorter than a long horizon.
-    `perception` has watched the demonstration; the other arguments are those of `imitate`.
+    Long after the demonstration's end nothing is left to do: episodes are shorter than a long
+    horizon. `perception` has watched the demonstration; the other arguments are those of `imitate`.
     """
     switches = {without: False} if without else {}
     horizon = env.spec.max_episode_steps
@@ -139,13 +147,23 @@ def watched(env, perception: Perception, robot, form="mended", without=None):
 
 
 def imitate(
-    env, demo, robot, perception: Perception, recipe: Recipe, *, seed, run: Run, form="mended", without=None
+    env,
+    demo,
+    robot,
+    perception: Perception,
+    recipe: Recipe,
+    *,
+    seed,
+    run: Run,
+    form="mended",
+    without=None,
 ):
     """Learn a policy for `env`, a Gymnasium environment of RGB frames, from one demonstration.
 
     demo (N, 84, 84, 3) uint8: the human video. robot (M, 84, 84, 3) uint8: random robot motion.
-    form: "literal" for Eq. 8-10 as written, "mended" for what `reward.py` adds; without: one of `MENDS`
-    to leave out. Returns the agent and `env` wrapped so that its observations are the policy's.
+    form: "literal" for Eq. 8-10 as written, "mended" for what `reward.py` adds; without: one of
+    `MENDS` to leave out. Returns the agent and `env` wrapped so that its observations are the
+    policy's.
     """
     perception.watch(demo)
     env, _ = watched(env, perception, robot, form, without)

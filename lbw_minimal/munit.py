@@ -1,9 +1,11 @@
-"""MUNIT (Eq. 1-5): frames of the human domain x become frames of the robot domain y, learnt from no pair.
+"""MUNIT (Eq. 1-5): frames of the human domain x become frames of the robot domain y, learnt from no
+pair.
 
-The content code c says where things are, the style code s how a domain looks: G_Y(c_x, s_y) is human frame
-x as the robot's camera would see it. In: videos (T, 84, 84, 3) uint8 of both domains. Out: the networks, and
-the translated video. Not in the paper, because without them small objects vanish or wall and table swap
-their brightness: a cycle loss, losses weighted by the distance from the median frame, least squares.
+The content code c says where things are, the style code s how a domain looks: G_Y(c_x, s_y) is
+human frame x as the robot's camera would see it. In: videos (T, 84, 84, 3) uint8 of both domains.
+Out: the networks, and the translated video. Not in the paper, because without them small objects
+vanish or wall and table swap their brightness: a cycle loss, losses weighted by the distance from
+the median frame, least squares.
 """
 
 from __future__ import annotations
@@ -26,23 +28,33 @@ from lbw_minimal.training import (
     seed_everything,
 )
 
-LAMBDA_IMAGE, LAMBDA_CONTENT, LAMBDA_STYLE = 5.0, 0.5, 0.5  # Eq. 5; half of MUNIT's, or the arm stays blurred
-LAMBDA_CYCLE = 5.0  # not in the paper: MUNIT's authors add it where pixels must stay aligned, as here
+# Eq. 5; half of MUNIT's, or the arm stays blurred
+LAMBDA_IMAGE, LAMBDA_CONTENT, LAMBDA_STYLE = 5.0, 0.5, 0.5
+# not in the paper: MUNIT's authors add it where pixels must stay aligned, as here
+LAMBDA_CYCLE = 5.0
 # Not in the paper: weights of what differs from the median frame, see `motion_weight`.
 MOTION_L1 = 4.0  # with 0 the L1 losses forget the object, which covers 1 % of the picture
-MOTION_GAN = 20.0  # with 0 four fifths of the patches are wall, and the critics hardly look at the arm
-# Of the two Adams, down to 0 over the second half. Critics as slow as the generators leave the arm blurred.
+# with 0 four fifths of the patches are wall, and the critics hardly look at the arm
+MOTION_GAN = 20.0
+# Of the two Adams, down to 0 over the second half. Critics as slow as the generators leave the arm
+# blurred.
 LEARNING_RATE, CRITIC_RATE = 4e-4, 1.2e-3
 AVERAGE = 0.995  # decay a step of the averaged weights, which flicker less from frame to frame
 LOG_EVERY = 50  # steps
 
 
-def adain(h: torch.Tensor, mean: torch.Tensor | None = None, std: torch.Tensor | None = None) -> torch.Tensor:
-    """h (B, C, H, W) with each channel of each image brought to mean and std (B, C), by default 0 and 1."""
+def adain(
+    h: torch.Tensor, mean: torch.Tensor | None = None, std: torch.Tensor | None = None
+) -> torch.Tensor:
+    """h (B, C, H, W) with each channel of each image brought to mean and std (B, C), by default 0
+    and 1."""
     B, C, H, W = h.shape
-    # Batch norm over B * C channels is this very formula in one pass: 3 times faster on a CPU than var_mean.
+    # Batch norm over B * C channels is this very formula in one pass: 3 times faster on a CPU than
+    # var_mean.
     mean, std = (None if p is None else p.float().reshape(-1) for p in (mean, std))
-    return F.batch_norm(h.reshape(1, B * C, H, W), None, None, std, mean, training=True).reshape(h.shape)
+    return F.batch_norm(h.reshape(1, B * C, H, W), None, None, std, mean, training=True).reshape(
+        h.shape
+    )
 
 
 class _Residual(nn.Module):
@@ -57,8 +69,8 @@ class _Residual(nn.Module):
 class _ContentEncoder(nn.Module):
     def __init__(self, width, blocks):
         super().__init__()
-        # Half of the published network's time goes into its layers at 84 x 84. Folding 2 x 2 pixels into
-        # channels starts at 42 x 42 and loses nothing.
+        # Half of the published network's time goes into its layers at 84 x 84. Folding 2 x 2 pixels
+        # into channels starts at 42 x 42 and loses nothing.
         self.stem = nn.Conv2d(12, 2 * width, 3, padding=1)
         self.down = nn.Conv2d(2 * width, 4 * width, 4, 2, 1)
         self.blocks = nn.Sequential(*(_Residual(4 * width) for _ in range(blocks)))
@@ -82,10 +94,13 @@ class _Decoder(nn.Module):
     def __init__(self, width, style_dim, blocks):
         super().__init__()
         self.blocks = nn.ModuleList(_Residual(4 * width) for _ in range(blocks))
-        self.mlp = nn.Sequential(nn.Linear(style_dim, 64), nn.ReLU(), nn.Linear(64, blocks * 4 * 4 * width))
+        self.mlp = nn.Sequential(
+            nn.Linear(style_dim, 64), nn.ReLU(), nn.Linear(64, blocks * 4 * 4 * width)
+        )
         self.up = nn.ConvTranspose2d(4 * width, 2 * width, 4, 2, 1)
         self.out = nn.ConvTranspose2d(2 * width, 3, 4, 2, 1)
-        with torch.no_grad():  # start at middle grey: at the ends of tanh a wrong brightness would stick
+        # start at middle grey: at the ends of tanh a wrong brightness would stick
+        with torch.no_grad():
             self.out.weight.mul_(0.1)
             self.out.bias.zero_()
 
@@ -97,14 +112,22 @@ class _Decoder(nn.Module):
 
 
 class MUNIT(nn.Module):
-    """E^c, E^s and G of both domains, "x" (human) and "y" (robot); images (B, 3, 84, 84) in [-1, 1]."""
+    """E^c, E^s and G of both domains, "x" (human) and "y" (robot); images (B, 3, 84, 84) in [-1,
+    1]."""
 
-    def __init__(self, width: int = 20, style_dim: int = 8, blocks: int = 2, shared_content: bool = True):
+    def __init__(
+        self, width: int = 20, style_dim: int = 8, blocks: int = 2, shared_content: bool = True
+    ):
         super().__init__()
-        self.sizes = dict(width=width, style_dim=style_dim, blocks=blocks, shared_content=shared_content)
+        self.sizes = dict(
+            width=width, style_dim=style_dim, blocks=blocks, shared_content=shared_content
+        )
         E_c = _ContentEncoder(width, blocks)
-        # Shared, equal things start with equal codes in both domains; apart, the critics alone match them.
-        self.E_c = nn.ModuleDict({"x": E_c, "y": E_c if shared_content else _ContentEncoder(width, blocks)})
+        # Shared, equal things start with equal codes in both domains; apart, the critics alone
+        # match them.
+        self.E_c = nn.ModuleDict(
+            {"x": E_c, "y": E_c if shared_content else _ContentEncoder(width, blocks)}
+        )
         self.E_s = nn.ModuleDict({domain: _style_encoder(style_dim) for domain in "xy"})
         self.G = nn.ModuleDict({domain: _Decoder(width, style_dim, blocks) for domain in "xy"})
 
@@ -122,7 +145,8 @@ class MUNIT(nn.Module):
 
 
 class Critic(nn.Module):
-    """D of one domain: scores of all patches of 22 and 44 pixels of (B, 3, 84, 84), 1 real, 0 translated."""
+    """D of one domain: scores of all patches of 22 and 44 pixels of (B, 3, 84, 84), 1 real, 0
+    translated."""
 
     def __init__(self, width: int = 32):
         super().__init__()
@@ -137,11 +161,13 @@ class Critic(nn.Module):
         )
 
     def forward(self, image):
-        return [self.scales[0](image), self.scales[1](F.avg_pool2d(image, 2))]  # (B, 1, 10, 10), (B, 1, 5, 5)
+        # (B, 1, 10, 10), (B, 1, 5, 5)
+        return [self.scales[0](image), self.scales[1](F.avg_pool2d(image, 2))]
 
 
 def motion_weight(image: torch.Tensor, median: torch.Tensor | None, gain: float) -> torch.Tensor:
-    """1 + gain * distance of image (B, 3, H, W) from its domain's median frame (1, 3, H, W): (B, 1, H, W).
+    """1 + gain * distance of image (B, 3, H, W) from its domain's median frame (1, 3, H, W): (B, 1,
+    H, W).
 
     Not in the paper; without a median it is 1 everywhere, which is the paper.
     """
@@ -155,7 +181,8 @@ def _l1(a, b, weight=1.0):
 
 
 def _least_squares(scores, target, weight):
-    # Not in the paper: the logarithms of Eq. 1 leave a losing generator without a gradient, squares do not.
+    # Not in the paper: the logarithms of Eq. 1 leave a losing generator without a gradient, squares
+    # do not.
     loss = 0.0
     for score in scores:  # (B, 1, h, w) of one scale
         cells = F.adaptive_avg_pool2d(weight, score.shape[2:])
@@ -164,16 +191,21 @@ def _least_squares(scores, target, weight):
 
 
 def swap(model: MUNIT, x: torch.Tensor, y: torch.Tensor) -> tuple[torch.Tensor, ...]:
-    """c_x, c_y, s_x, s_y, G_X(c_y, s_x), G_Y(c_x, s_y) of images x and y (B, 3, 84, 84) in [-1, 1]."""
+    """c_x, c_y, s_x, s_y, G_X(c_y, s_x), G_Y(c_x, s_y) of images x and y (B, 3, 84, 84) in [-1,
+    1]."""
     c_x, c_y = model.content(x, "x"), model.content(y, "y")
     s_x, s_y = model.style(x, "x"), model.style(y, "y")
     return c_x, c_y, s_x, s_y, model.decode(c_y, s_x, "x"), model.decode(c_x, s_y, "y")
 
 
-def generator_losses(model, critics, x, y, swapped, median_x=None, median_y=None) -> dict[str, torch.Tensor]:
-    """The encoders' and generators' side of Eq. 1 to 4 by the paper's names, and the cycle loss L_cyc.
+def generator_losses(
+    model, critics, x, y, swapped, median_x=None, median_y=None
+) -> dict[str, torch.Tensor]:
+    """The encoders' and generators' side of Eq. 1 to 4 by the paper's names, and the cycle loss
+    L_cyc.
 
-    x, y (B, 3, 84, 84) in [-1, 1], `swapped` from `swap`; medians (1, 3, 84, 84) switch motion weights on.
+    x, y (B, 3, 84, 84) in [-1, 1], `swapped` from `swap`; medians (1, 3, 84, 84) switch motion
+    weights on.
     """
     c_x, c_y, s_x, s_y, x_of_y, y_of_x = swapped
     c_x_again, c_y_again = model.content(y_of_x, "y"), model.content(x_of_y, "x")
@@ -206,11 +238,17 @@ def total_loss(L: dict[str, torch.Tensor]) -> torch.Tensor:
     )
 
 
-def discriminator_losses(critics, x, y, swapped, median_x=None, median_y=None) -> dict[str, torch.Tensor]:
-    """The critics' side of Eq. 1 in least squares: real x and y to 1, the translations in `swapped` to 0."""
+def discriminator_losses(
+    critics, x, y, swapped, median_x=None, median_y=None
+) -> dict[str, torch.Tensor]:
+    """The critics' side of Eq. 1 in least squares: real x and y to 1, the translations in `swapped`
+    to 0."""
 
     def loss(D, real, made, median):
-        w_real, w_made = motion_weight(real, median, MOTION_GAN), motion_weight(made, median, MOTION_GAN)
+        w_real, w_made = (
+            motion_weight(real, median, MOTION_GAN),
+            motion_weight(made, median, MOTION_GAN),
+        )
         return _least_squares(D(real), 1.0, w_real) + _least_squares(D(made), 0.0, w_made)  # Eq. 1
 
     x_of_y, y_of_x = swapped[4].detach(), swapped[5].detach()
@@ -227,11 +265,20 @@ def to_images(frames: np.ndarray, device: torch.device | str = "cpu") -> torch.T
 
 def to_frames(images: torch.Tensor) -> np.ndarray:
     """Images (B, 3, H, W) in [-1, 1] as frames (B, H, W, 3) uint8."""
-    return ((images.float() + 1) * 127.5).round().clamp(0, 255).byte().permute(0, 2, 3, 1).cpu().numpy()
+    return (
+        ((images.float() + 1) * 127.5)
+        .round()
+        .clamp(0, 255)
+        .byte()
+        .permute(0, 2, 3, 1)
+        .cpu()
+        .numpy()
+    )
 
 
 def _bfloat16(device):
-    # bfloat16 halves a convolution's time where the processor knows it, and costs time where it does not.
+    # bfloat16 halves a convolution's time where the processor knows it, and costs time where it
+    # does not.
     able = device.type != "cpu" or torch.cpu.get_capabilities().get("avx512_bf16", False)
     return torch.autocast(device.type, torch.bfloat16, enabled=able)
 
@@ -241,7 +288,8 @@ def _draw(frames, n, rng, device):
 
 
 def _median(frames, device):
-    return to_images(np.median(frames, axis=0, keepdims=True).astype(np.uint8), device)  # (1, 3, 84, 84)
+    # (1, 3, 84, 84)
+    return to_images(np.median(frames, axis=0, keepdims=True).astype(np.uint8), device)
 
 
 def train(
@@ -255,11 +303,13 @@ def train(
     device: str = "cpu",
     checkpoint: Checkpoint | None = None,
 ) -> tuple[MUNIT, list[dict]]:
-    """Train on human and robot frames (T, 84, 84, 3) uint8; returns the model of averaged weights and a log.
+    """Train on human and robot frames (T, 84, 84, 3) uint8; returns the model of averaged weights
+    and a log.
 
-    A row of the log holds `step`, each loss's mean since the row before, and how many grey levels (0-255) the
-    mean translation is off that domain's mean frame: `mean_image^x`, `mean_image^y`. Different poses cost a
-    few; over 20 two regions, such as wall and table, have swapped their brightness.
+    A row of the log holds `step`, each loss's mean since the row before, and how many grey levels
+    (0-255) the mean translation is off that domain's mean frame: `mean_image^x`, `mean_image^y`.
+    Different poses cost a few; over 20 two regions, such as wall and table, have swapped their
+    brightness.
     """
     checkpoint = checkpoint or Checkpoint(None)
     rng = seed_everything(seed)
@@ -289,7 +339,8 @@ def train(
             adam.param_groups[0]["lr"] = rate * min(1.0, 2 * (1 - step / iterations))
         x, y = _draw(human, batch, rng, device), _draw(robot, batch, rng, device)
 
-        critics.requires_grad_(False)  # the generators' step learns through the critics, not in them
+        # the generators' step learns through the critics, not in them
+        critics.requires_grad_(False)
         with _bfloat16(device):
             swapped = swap(model, x, y)
             L_G = generator_losses(model, critics, x, y, swapped, median_x, median_y)
@@ -298,14 +349,16 @@ def train(
         adam_G.step()
 
         critics.requires_grad_(True)
-        with _bfloat16(device):  # on the translations made above: new ones would cost an eighth more
+        # on the translations made above: new ones would cost an eighth more
+        with _bfloat16(device):
             L_D = discriminator_losses(critics, x, y, swapped, median_x, median_y)
         adam_D.zero_grad()
         sum(L_D.values()).backward()
         adam_D.step()
 
         step += 1
-        decay = min(AVERAGE, step / (step + 10))  # short at first, or the random start stays in for long
+        # short at first, or the random start stays in for long
+        decay = min(AVERAGE, step / (step + 10))
         with torch.no_grad():
             for mean, p in zip(average.parameters(), model.parameters(), strict=True):
                 mean.lerp_(p, 1 - decay)
@@ -339,7 +392,8 @@ def robot_style(model: MUNIT, robot_frames: np.ndarray) -> torch.Tensor:
 def translate(model: MUNIT, frames: np.ndarray, robot_style: torch.Tensor) -> np.ndarray:
     """Human frames (T, 84, 84, 3) uint8 as the robot's, same shape and type: G_Y(c_x, s_y).
 
-    One style (style_dim,) for the whole video: a fresh one a frame would flicker into the keypoints.
+    One style (style_dim,) for the whole video: a fresh one a frame would flicker into the
+    keypoints.
     """
     return _decoded(model, frames, robot_style, "x", "y")
 
@@ -355,11 +409,18 @@ def _decoded(model, frames, style, source, target):
 
 @torch.no_grad()
 def mean_images(model: MUNIT, human: np.ndarray, robot: np.ndarray) -> dict[str, np.ndarray]:
-    """Mean frames (84, 84, 3) in 0-255: "x" and "y" of the domains, "x_of_y" and "y_of_x" of translations."""
+    """Mean frames (84, 84, 3) in 0-255: "x" and "y" of the domains, "x_of_y" and "y_of_x" of
+    translations."""
     human, robot = _spread(human, 32), _spread(robot, 32)
     s_x = model.style(to_images(human, next(model.parameters()).device), "x").mean(0)
-    x_of_y, y_of_x = _decoded(model, robot, s_x, "y", "x"), translate(model, human, robot_style(model, robot))
-    return {k: f.mean(0) for k, f in (("x", human), ("x_of_y", x_of_y), ("y", robot), ("y_of_x", y_of_x))}
+    x_of_y, y_of_x = (
+        _decoded(model, robot, s_x, "y", "x"),
+        translate(model, human, robot_style(model, robot)),
+    )
+    return {
+        k: f.mean(0)
+        for k, f in (("x", human), ("x_of_y", x_of_y), ("y", robot), ("y_of_x", y_of_x))
+    }
 
 
 def save(path: Path | str, model: MUNIT, style: torch.Tensor, task: str) -> None:
@@ -373,10 +434,13 @@ def save(path: Path | str, model: MUNIT, style: torch.Tensor, task: str) -> None
 
 
 def load(path: Path | str, task: str) -> tuple[MUNIT, torch.Tensor]:
-    """Model and style that `save` wrote. Raises InputError if it holds another thing or another task."""
+    """Model and style that `save` wrote. Raises InputError if it holds another thing or another
+    task."""
     saved = load_state(path)
     if saved.get("kind") != "munit":
-        raise InputError(f"{path}: not the weights of a MUNIT; give the file that its training wrote.")
+        raise InputError(
+            f"{path}: not the weights of a MUNIT; give the file that its training wrote."
+        )
     if saved["task"] != task:
         raise InputError(
             f"{path}: weights of the task {saved['task']}, not of {task}; give those or train anew."

@@ -1,8 +1,9 @@
 """The page of a run: what the human showed, what perception made of it, what the robot learnt.
 
-In: frames (T, 84, 84, 3) uint8, keypoints z (T, K, 2) in [-1, 1] (x right, y down), logs, figures. Out: one
-HTML file that needs no other file and no network, for readers who have never seen the paper. Each picture
-is a function of its own, for notebooks, in Okabe and Ito's colours, which colour-blind readers tell apart.
+In: frames (T, 84, 84, 3) uint8, keypoints z (T, K, 2) in [-1, 1] (x right, y down), logs, figures.
+Out: one HTML file that needs no other file and no network, for readers who have never seen the
+paper. Each picture is a function of its own, for notebooks, in Okabe and Ito's colours, which
+colour-blind readers tell apart.
 """
 
 from __future__ import annotations
@@ -53,18 +54,29 @@ def colour(k: int) -> tuple[int, int, int]:
 
 
 def draw_keypoints(frames: np.ndarray, z: np.ndarray, scale: int = 4) -> np.ndarray:
-    """Frames (T, H, W, 3) enlarged `scale` times, with keypoints z (T, K, 2) on them, numbered from 1."""
+    """Frames (T, H, W, 3) enlarged `scale` times, with keypoints z (T, K, 2) on them, numbered from
+    1."""
     out = enlarge(frames, scale)
     h, w = out.shape[1:3]
     for image, points in zip(out, z, strict=True):
-        # z counts from edge to edge, pixels from centre to centre; OpenCV takes sixteenths of a pixel.
+        # z counts from edge to edge, pixels from centre to centre; OpenCV takes sixteenths of a
+        # pixel.
         for k, (x, y) in enumerate(((points + 1) / 2 * (w, h) - 0.5).tolist()):
             at = round(16 * x), round(16 * y)
             for radius, paint in ((2.6, (0, 0, 0)), (2.3, (255, 255, 255)), (1.8, colour(k))):
                 cv2.circle(image, at, round(radius * scale * 16), paint, -1, cv2.LINE_AA, shift=4)
             if scale >= 4:  # below, a digit would not be legible
                 corner, size = (round(x - 0.9 * scale), round(y + 1.1 * scale)), 0.1 * scale
-                cv2.putText(image, str(k + 1), corner, cv2.FONT_HERSHEY_SIMPLEX, size, ink(k), 1, cv2.LINE_AA)
+                cv2.putText(
+                    image,
+                    str(k + 1),
+                    corner,
+                    cv2.FONT_HERSHEY_SIMPLEX,
+                    size,
+                    ink(k),
+                    1,
+                    cv2.LINE_AA,
+                )
     return out
 
 
@@ -83,15 +95,19 @@ def spread(T: int, n: int) -> np.ndarray:
     return np.linspace(0, T - 1, min(n, T)).round().astype(int)
 
 
-def strip(frames: np.ndarray, z: np.ndarray | None = None, n: int = 8, scale: int = 3) -> np.ndarray:
-    """n frames side by side, (scale H, n scale W, 3): a video at one glance, keypoints on it where given."""
+def strip(
+    frames: np.ndarray, z: np.ndarray | None = None, n: int = 8, scale: int = 3
+) -> np.ndarray:
+    """n frames side by side, (scale H, n scale W, 3): a video at one glance, keypoints on it where
+    given."""
     i = spread(len(frames), n)
     tiles = enlarge(frames[i], scale) if z is None else draw_keypoints(frames[i], z[i], scale)
     return np.concatenate(tiles, axis=1)
 
 
 def curve(log: list[dict], form: str = "mended", last: int = 10) -> Figure:
-    """Success and return of the training episodes over environment steps; log: rows of `sac.train`."""
+    """Success and return of the training episodes over environment steps; log: rows of
+    `sac.train`."""
     steps = np.array([row["step"] for row in log])
     with rc_context(STYLE):
         figure = Figure(figsize=(6.4, 4.4))
@@ -112,7 +128,8 @@ def curve(log: list[dict], form: str = "mended", last: int = 10) -> Figure:
 
 
 def paths(z_demo: np.ndarray, z: np.ndarray, background: np.ndarray | None = None) -> Figure:
-    """Paths of the demonstration's keypoints (N, K, 2), dashed, and the robot's (T, K, 2) in the image."""
+    """Paths of the demonstration's keypoints (N, K, 2), dashed, and the robot's (T, K, 2) in the
+    image."""
     with rc_context(STYLE):
         figure = Figure(figsize=(4.8, 4.8))
         axis = figure.subplots()
@@ -128,7 +145,10 @@ def paths(z_demo: np.ndarray, z: np.ndarray, background: np.ndarray | None = Non
             axis.text(*z[-1, k], k + 1, ha="center", va="center_baseline", fontsize=8, color=text)
         ticks = (-1, -0.5, 0, 0.5, 1)
         axis.set(xlim=(-1, 1), ylim=(1, -1), xticks=ticks, yticks=ticks, aspect="equal")
-        axis.set(xlabel="x, from left to right (half images)", ylabel="y, from top to bottom (half images)")
+        axis.set(
+            xlabel="x, from left to right (half images)",
+            ylabel="y, from top to bottom (half images)",
+        )
         axis.grid(False)
     return figure
 
@@ -141,18 +161,23 @@ def courses(z_demo: np.ndarray, z: np.ndarray) -> Figure:
         for i, (axis, name) in enumerate(((above, "x"), (below, "y"))):
             for k in range(z.shape[1]):
                 paint = np.array(colour(k)) / 255
-                axis.plot(np.linspace(0, 1, len(z_demo)), z_demo[:, k, i], "--", color=paint, lw=1.5)
+                axis.plot(
+                    np.linspace(0, 1, len(z_demo)), z_demo[:, k, i], "--", color=paint, lw=1.5
+                )
                 axis.plot(np.linspace(0, 1, len(z)), z[:, k, i], color=paint, lw=2, label=k + 1)
             axis.set(ylabel=f"{name} (half images)", xlim=(0, 1))
         below.invert_yaxis()  # down is down, as in the image
         below.set_xlabel("share of the video that has passed")
         lines, names = above.get_legend_handles_labels()
-        figure.legend(lines, names, title="keypoint", loc="outside upper center", ncols=8, handlelength=1)
+        figure.legend(
+            lines, names, title="keypoint", loc="outside upper center", ncols=8, handlelength=1
+        )
     return figure
 
 
 def parts(rows: list[dict], fps: float = 25, success: int | None = None) -> Figure:
-    """The parts of the reward over an episode, rows one a step; success: the first step it was done at."""
+    """The parts of the reward over an episode, rows one a step; success: the first step it was done
+    at."""
     t = np.arange(1, len(rows) + 1) / fps
     with rc_context(STYLE):
         figure = Figure(figsize=(6.4, 3.2))
@@ -163,7 +188,9 @@ def parts(rows: list[dict], fps: float = 25, success: int | None = None) -> Figu
             axis.plot(t, values, kind, color=COLOURS[(1, 0, 2, 3)[k % 4]], lw=2, label=name)
         if success:
             axis.axvline(success / fps, color="black", lw=1)
-            axis.annotate(" task done", (success / fps, 0.03), xycoords=("data", "axes fraction"), fontsize=9)
+            axis.annotate(
+                " task done", (success / fps, 0.03), xycoords=("data", "axes fraction"), fontsize=9
+            )
         axis.set(xlabel="time in the episode (s)", ylabel="part of the reward a step")
         axis.set_ylim(top=max(0, axis.get_ylim()[1]))  # 0 is the best there is
         figure.legend(loc="outside upper center", ncols=4)
@@ -270,13 +297,16 @@ def write_report(
     """Write the page of a run, whole or not at all; what is None or empty is left out.
 
     demo, translated: (N, 84, 84, 3) uint8; z_demo (N, K, 2): the keypoints found on `translated`.
-    log: the policy's, a row an episode. episode: a test episode's "frames" (T, 84, 84, 3) uint8, "z"
-    (T, K, 2) (or observations whose first 2K numbers are z), and "parts", a dict of reward parts a step.
-    metrics: as in metrics.json: "success", "episodes", "stages" in s, "perception", "settings", "machine".
-    scene_html: a page of its own. command: what makes this run again.
+    log: the policy's, a row an episode. episode: a test episode's "frames" (T, 84, 84, 3) uint8,
+    "z" (T, K, 2) (or observations whose first 2K numbers are z), and "parts", a dict of reward
+    parts a step. metrics: as in metrics.json: "success", "episodes", "stages" in s, "perception",
+    "settings", "machine". scene_html: a page of its own. command: what makes this run again.
     """
     metrics, episode = metrics or {}, episode or {}
-    episodes, form = metrics.get("episodes", []), metrics.get("settings", {}).get("reward", "mended")
+    episodes, form = (
+        metrics.get("episodes", []),
+        metrics.get("settings", {}).get("reward", "mended"),
+    )
     page = [headline(task, metrics, form)]
     columns = demonstration(demo, translated, z_demo, fps)
     page += section("What the human showed, and what the robot saw in it", DEMONSTRATION, columns)
@@ -284,19 +314,24 @@ def write_report(
         frames, K = episode["frames"], z_demo.shape[1]
         z = np.asarray(episode["z"], float).reshape(len(frames), -1)[:, : 2 * K].reshape(-1, K, 2)
         shown = picture(
-            data_uri("image/webp", film(draw_keypoints(frames, z), fps / 2)), "Film of a test episode"
+            data_uri("image/webp", film(draw_keypoints(frames, z), fps / 2)),
+            "Film of a test episode",
         )
         marks = " ".join("✓" if row["success"] else "✗" for row in episodes)
         marks = f'<p class="small">All test episodes, this one first: {marks}</p>' if marks else ""
         page += section("What the robot does now", EPISODE, shown, marks)
         pair = picture(svg(paths(z_demo, z, frames[-1])), "Paths of the keypoints in the image")
         pair += picture(svg(courses(z_demo, z)), "Coordinates of the keypoints over time")
-        page += section("Does it follow the demonstration?", PATHS, f'<div class="row">{pair}</div>')
+        page += section(
+            "Does it follow the demonstration?", PATHS, f'<div class="row">{pair}</div>'
+        )
     if scene_html:
         frame = f'<iframe title="The episode in 3-D" srcdoc="{escape(scene_html)}"></iframe>'
         page += section("The same episode in three dimensions", SCENE, frame, kind="scene")
     if log and len(log) > 1:
-        page += section("How the robot learnt", LEARNING, picture(svg(curve(log, form)), "Learning curves"))
+        page += section(
+            "How the robot learnt", LEARNING, picture(svg(curve(log, form)), "Learning curves")
+        )
     if episode.get("parts"):
         done = episodes[0].get("first_success") if episodes else None
         shown = picture(svg(parts(episode["parts"], fps, done)), "Parts of the reward over time")
@@ -327,7 +362,11 @@ def section(title: str, *body: str, kind: str = "") -> list[str]:
 
 def headline(task, metrics, form):
     """The result in large letters, its figures in tiles, and how it came about."""
-    settings, result, name = metrics.get("settings", {}), metrics.get("success"), escape(task).capitalize()
+    settings, result, name = (
+        metrics.get("settings", {}),
+        metrics.get("success"),
+        escape(task).capitalize(),
+    )
     title, tiles = f"{name}: a robot learns from one video", []
     if result:
         n = result["episodes"]
@@ -337,16 +376,23 @@ def headline(task, metrics, form):
     if stages := metrics.get("stages"):
         tiles += [(duration(sum(stages.values())), "of learning in this run")]
     tiles += [(str(settings[key]), key) for key in ("seed", "reward") if key in settings]
-    cells = "".join(f"<div><b>{escape(value)}</b><span>{label}</span></div>" for value, label in tiles)
-    note = "This was a smoke run: every stage ran, none long enough to learn. Its figures say nothing."
+    cells = "".join(
+        f"<div><b>{escape(value)}</b><span>{label}</span></div>" for value, label in tiles
+    )
+    note = (
+        "This was a smoke run: every stage ran, none long enough to learn. Its figures say nothing."
+    )
     note = f'<p class="note">{note}</p>' if settings.get("fast") else ""
     return f'<h1>{title}</h1>\n<div class="tiles">{cells}</div>\n{note}{INTRODUCTION}'
 
 
 def demonstration(demo, translated, z_demo, fps):
-    """As the paper's Fig. 5: human frames above their translations, in columns that wrap when narrow."""
+    """As the paper's Fig. 5: human frames above their translations, in columns that wrap when
+    narrow."""
     i, columns = spread(len(demo), 8), []
-    pairs = np.concatenate([enlarge(demo[i], 3), draw_keypoints(translated[i], z_demo[i], 3)], axis=1)
+    pairs = np.concatenate(
+        [enlarge(demo[i], 3), draw_keypoints(translated[i], z_demo[i], 3)], axis=1
+    )
     for t, both in zip(i, pairs, strict=True):
         shown = picture(png(both), f"Frame {t + 1} of the human and its translation with keypoints")
         columns.append(f"<figure>{shown}<figcaption>{t / fps:.1f} s</figcaption></figure>")
@@ -367,8 +413,12 @@ def figures(metrics):
         names = dict.fromkeys(name for column in scores.values() for name in column)
         rows = [(name, *(score(column.get(name)) for column in scores.values())) for name in names]
         rest = {name: value for name, value in perception.items() if name not in scores}
-        page += section("Perception, measured", PERCEPTION, table([("", *scores), *rows]), table(flat(rest)))
-    settings = flat(metrics.get("settings", {})) + flat({k: v for k, v in metrics.items() if k in MACHINE})
+        page += section(
+            "Perception, measured", PERCEPTION, table([("", *scores), *rows]), table(flat(rest))
+        )
+    settings = flat(metrics.get("settings", {})) + flat(
+        {k: v for k, v in metrics.items() if k in MACHINE}
+    )
     return page + (section("Settings", table(settings)) if settings else [])
 
 
@@ -394,7 +444,9 @@ def table(rows: list[tuple[str, ...]]) -> str:
     lines = []
     for name, *values in rows:
         lines.append(
-            "<tr>" + "".join(f"<td>{escape(c)}</td>" for c in (name.replace("_", " "), *values)) + "</tr>"
+            "<tr>"
+            + "".join(f"<td>{escape(c)}</td>" for c in (name.replace("_", " "), *values))
+            + "</tr>"
         )
     return f"<table>{''.join(lines)}</table>" if rows else ""
 
@@ -421,7 +473,8 @@ def svg(figure: Figure) -> str:
 
 
 def film(frames: np.ndarray, fps: float) -> bytes:
-    """Frames (T, H, W, 3) as an animated WebP, which all browsers show; it loops and rests at its end."""
+    """Frames (T, H, W, 3) as an animated WebP, which all browsers show; it loops and rests at its
+    end."""
     first, *rest = map(Image.fromarray, frames)
     out, times = io.BytesIO(), [round(1000 / fps)] * len(rest) + [1000]  # ms
     first.save(out, "WEBP", save_all=True, append_images=rest, duration=times, loop=0, quality=80)

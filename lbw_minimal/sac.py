@@ -1,10 +1,11 @@
-"""Soft actor-critic on vectors (Haarnoja et al. 2018, arXiv 1812.05905), the RL algorithm of the paper.
+"""Soft actor-critic on vectors (Haarnoja et al. 2018, arXiv 1812.05905), the RL algorithm of the
+paper.
 
 In: a Gymnasium environment with vector observations and actions in [-1, 1]. Out: a policy and a log
-with a row an episode. Not in the publication: LayerNorm in the critics (keeps Q from running away when
-steps are few), running normalisation of observations, four updates a step, a lower target entropy, a
-learning rate that falls towards the end, an averaged copy of the actor, and a last round without noise in
-which raw and averaged actors of the best episodes compete for acting at test time.
+with a row an episode. Not in the publication: LayerNorm in the critics (keeps Q from running away
+when steps are few), running normalisation of observations, four updates a step, a lower target
+entropy, a learning rate that falls towards the end, an averaged copy of the actor, and a last round
+without noise in which raw and averaged actors of the best episodes compete for acting at test time.
 """
 
 from __future__ import annotations
@@ -20,13 +21,18 @@ from torch import nn
 
 from .training import Checkpoint, load_state, progress, save_state, seed_everything
 
-LOG_STD_MIN, LOG_STD_MAX = -5.0, 2.0  # exp(-5) acts as good as deterministic; exp(2) is past tanh's ends
-ENTROPY = -2.0  # aimed at, per number of an action; the published -1 is noise of 0.09, too much to dose a hit
+# exp(-5) acts as good as deterministic; exp(2) is past tanh's ends
+LOG_STD_MIN, LOG_STD_MAX = -5.0, 2.0
+# aimed at, per number of an action; the published -1 is noise of 0.09, too much to dose a hit
+ENTROPY = -2.0
 WINDOW = 10  # episodes whose mean return makes the actors at their end candidates
 CANDIDATES = 4  # windows that are kept: training goes up and down
-TRIALS = 5  # episodes without noise for each candidate; with noise an actor may dose a hit, without overshoot
-FALL_FROM = 0.3  # of the training: from here the learning rate falls to 0; on slide 38 of 40 for 34 without
-MIN_OBS_STD = 0.02  # below it is a keypoint's noise: dividing by less would blow the noise up to a signal
+# episodes without noise for each candidate; with noise an actor may dose a hit, without overshoot
+TRIALS = 5
+# of the training: from here the learning rate falls to 0; on slide 38 of 40 for 34 without
+FALL_FROM = 0.3
+# below it is a keypoint's noise: dividing by less would blow the noise up to a signal
+MIN_OBS_STD = 0.02
 
 
 class Actor(nn.Module):
@@ -51,7 +57,8 @@ class Actor(nn.Module):
         mean, log_std = self(s)
         noise = torch.randn_like(mean)
         u = mean + log_std.exp() * noise
-        # log N(u) - log |da/du|, and log(1 - tanh(u)^2) = 2 (log 2 - u - softplus(-2u)) never overflows
+        # log N(u) - log |da/du|, and log(1 - tanh(u)^2) = 2 (log 2 - u - softplus(-2u)) never
+        # overflows
         log_normal = -0.5 * noise.square() - log_std - 0.5 * math.log(2 * math.pi)
         log_slope = 2 * (math.log(2) - u - F.softplus(-2 * u))
         return torch.tanh(u), (log_normal - log_slope).sum(-1)
@@ -70,7 +77,8 @@ class TwinCritic(nn.Module):
             self.biases.append(torch.empty(2, 1, n_out).uniform_(-bound, bound))
 
     def forward(self, s, a, frozen: bool = False):
-        """Q_1 and Q_2 (2, B) of s (B, S) and a (B, A); `frozen` lets gradients pass to `a` alone."""
+        """Q_1 and Q_2 (2, B) of s (B, S) and a (B, A); `frozen` lets gradients pass to `a`
+        alone."""
         W, b = ([p.detach() if frozen else p for p in ps] for ps in (self.weights, self.biases))
         x = torch.cat([s, a], -1).expand(2, -1, -1)  # (2, B, S + A)
         for i in range(2):
@@ -80,7 +88,8 @@ class TwinCritic(nn.Module):
 
 
 class ReplayBuffer:
-    """The last `capacity` transitions in arrays; `terminal` is 1 only where the task itself ended."""
+    """The last `capacity` transitions in arrays; `terminal` is 1 only where the task itself
+    ended."""
 
     def __init__(self, obs_dim: int, action_dim: int, capacity: int):
         shapes = {"obs": (obs_dim,), "action": (action_dim,), "next_obs": (obs_dim,)}
@@ -112,10 +121,10 @@ class ReplayBuffer:
 class SAC:
     """Actor, twin critics and temperature with their optimizers.
 
-    obs_dim, action_dim: sizes of the vectors; actions are in [-1, 1]. gamma: discount; 0.95 looks 20
-    steps ahead, enough for a reward that is paid at every step. tau: pace of the target critics.
-    alpha: first temperature, for rewards of about 1 a step. average: pace of `test_actor`, the actor's
-    mean over some 500 updates, until `train` puts the best one there.
+    obs_dim, action_dim: sizes of the vectors; actions are in [-1, 1]. gamma: discount; 0.95 looks
+    20 steps ahead, enough for a reward that is paid at every step. tau: pace of the target critics.
+    alpha: first temperature, for rewards of about 1 a step. average: pace of `test_actor`, the
+    actor's mean over some 500 updates, until `train` puts the best one there.
     """
 
     def __init__(
@@ -139,7 +148,8 @@ class SAC:
         self.target_entropy = ENTROPY * action_dim
         self.test_actor = deepcopy(self.actor).requires_grad_(False)
         self.target = deepcopy(self.critic).requires_grad_(False)
-        # One optimizer for all three: the calls, not the arithmetic, are what a small network costs.
+        # One optimizer for all three: the calls, not the arithmetic, are what a small network
+        # costs.
         groups = [
             {"params": [*self.critic.parameters(), self.log_alpha], "lr": critic_lr},
             {"params": list(self.actor.parameters()), "lr": actor_lr},
@@ -173,13 +183,15 @@ class SAC:
 
     @torch.no_grad()
     def act(self, obs, deterministic: bool = False) -> np.ndarray:
-        """Action (A,) float32 in [-1, 1] for an observation (S,): a sample, or the test actor's mean."""
+        """Action (A,) float32 in [-1, 1] for an observation (S,): a sample, or the test actor's
+        mean."""
         s = self.normalise(torch.as_tensor(obs, dtype=torch.float32))
         a = torch.tanh(self.test_actor(s)[0]) if deterministic else self.actor.sample(s)[0]
         return a.numpy()
 
     def critic_target(self, batch) -> torch.Tensor:
-        """y = r + gamma (1 - terminal) (min_i Q'_i(s', a') - alpha log pi(a'|s')), a' ~ pi(s').  (B,)"""
+        """y = r + gamma (1 - terminal) (min_i Q'_i(s', a') - alpha log pi(a'|s')), a' ~ pi(s').
+        (B,)"""
         with torch.no_grad():
             s_next = self.normalise(batch["next_obs"])
             a_next, log_pi = self.actor.sample(s_next)
@@ -187,7 +199,8 @@ class SAC:
             return batch["reward"] + self.gamma * (1 - batch["terminal"]) * value
 
     def update(self, batch: dict[str, torch.Tensor]) -> dict[str, float]:
-        """One gradient step of critics, actor and temperature on a batch of transitions; returns losses."""
+        """One gradient step of critics, actor and temperature on a batch of transitions; returns
+        losses."""
         s, y = self.normalise(batch["obs"]), self.critic_target(batch)
         critic_loss = (self.critic(s, batch["action"]) - y).square().mean(1).sum()
 
@@ -216,7 +229,9 @@ class SAC:
         return [deepcopy(actor.state_dict()) for actor in (self.actor, self.test_actor)]
 
     def _modules(self):
-        return {n: getattr(self, n) for n in ("actor", "critic", "test_actor", "target", "optimizer")}
+        return {
+            n: getattr(self, n) for n in ("actor", "critic", "test_actor", "target", "optimizer")
+        }
 
     def state(self) -> dict:
         """All that `load_state` needs to go on exactly here."""
@@ -226,8 +241,11 @@ class SAC:
     def load_state(self, state: dict) -> None:
         for n, m in self._modules().items():
             m.load_state_dict(state[n])
-        self.log_alpha.data.copy_(state["log_alpha"])  # in place: the optimizer holds this very tensor
-        self.obs_mean, self.obs_var, self.obs_count = (state[f"obs_{n}"] for n in ("mean", "var", "count"))
+        # in place: the optimizer holds this very tensor
+        self.log_alpha.data.copy_(state["log_alpha"])
+        self.obs_mean, self.obs_var, self.obs_count = (
+            state[f"obs_{n}"] for n in ("mean", "var", "count")
+        )
 
 
 def save(path, sac: SAC) -> None:
@@ -259,12 +277,12 @@ def train(
     """Train on `env` until the first episode that ends at or after `steps` environment steps.
 
     env: observations (S,) float32, actions (A,) in [-1, 1]. Its `info["reward_parts"]` and
-    `info["is_success"]`, that of an episode's last step, go to the log and nowhere else. updates: gradient
-    steps an environment step, after `random_steps` uniformly random ones. evaluate(sac) -> dict joins the log
-    every `evaluate_every` episodes. recipe: arguments of `SAC`. Returns the agent and the log, a row an
-    episode. A resumed run does what the killed one would have done: each episode starts from
-    (seed, episode), and checkpoints are taken between episodes. The agent's test-time actor is chosen at
-    the end, by return: see `best_actor`.
+    `info["is_success"]`, that of an episode's last step, go to the log and nowhere else. updates:
+    gradient steps an environment step, after `random_steps` uniformly random ones. evaluate(sac) ->
+    dict joins the log every `evaluate_every` episodes. recipe: arguments of `SAC`. Returns the
+    agent and the log, a row an episode. A resumed run does what the killed one would have done:
+    each episode starts from (seed, episode), and checkpoints are taken between episodes. The
+    agent's test-time actor is chosen at the end, by return: see `best_actor`.
     """
     checkpoint = checkpoint or Checkpoint(None)
     rng = seed_everything(seed)
@@ -300,7 +318,10 @@ def train(
                 sac.slow_down(step / steps)
                 losses += [sac.update(buffer.sample(rng, batch)) for _ in range(updates)]
         row = {"episode": len(log), "step": step, "length": len(rows)}
-        row |= {"return": sum(r["reward"] for r in rows), "success": bool(info.get("is_success", False))}
+        row |= {
+            "return": sum(r["reward"] for r in rows),
+            "success": bool(info.get("is_success", False)),
+        }
         for many in (rows, losses):
             row |= {k: float(np.mean([r[k] for r in many])) for k in (many[0] if many else ())}
         if evaluate and len(log) % evaluate_every == evaluate_every - 1:
@@ -321,7 +342,8 @@ def train(
 
 
 def best_actor(env, sac: SAC, actors: list[dict], seed: int) -> dict:
-    """Of `actors`, state dicts, the one that earns most in `TRIALS` episodes without noise, alike for all."""
+    """Of `actors`, state dicts, the one that earns most in `TRIALS` episodes without noise, alike
+    for all."""
 
     def mean_return(actor):
         sac.test_actor.load_state_dict(actor)

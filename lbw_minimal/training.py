@@ -74,7 +74,8 @@ def _unflatten(tree, tensors):
 
 
 def save_state(path: Path | str, state: dict) -> None:
-    """Save nested dicts, lists, JSON values, arrays and tensors as one safetensors file, atomically."""
+    """Save nested dicts, lists, JSON values, arrays and tensors as one safetensors file,
+    atomically."""
     tensors: dict[str, torch.Tensor] = {}
     tree = _flatten(state, "", tensors)
     write_atomic(path, save(tensors, metadata={"tree": json.dumps(tree)}))
@@ -92,7 +93,9 @@ def load_state(path: Path | str) -> dict:
             tensors = {k: f.get_tensor(k) for k in f.keys()}  # noqa: SIM118 (not a dict)
             tree = json.loads(f.metadata()["tree"])
     except (SafetensorError, KeyError, TypeError, ValueError):
-        raise InputError(f"{path}: not a complete weights file; delete it and train again.") from None
+        raise InputError(
+            f"{path}: not a complete weights file; delete it and train again."
+        ) from None
     return _unflatten(tree, tensors)
 
 

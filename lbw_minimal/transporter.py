@@ -1,4 +1,5 @@
-"""Transporter (Sec. III-B of the paper): keypoints without labels, from what moves between two frames.
+"""Transporter (Sec. III-B of the paper): keypoints without labels, from what moves between two
+frames.
 
 Eq. 6 rebuilds frame y from the features of frame x, cut out and pasted at K points; Eq. 7 compares.
 Only what stands under a keypoint can change its place, so the points settle on arm and object.
@@ -26,19 +27,23 @@ from lbw_minimal.training import (
 )
 
 SIGMA = 0.1  # width of a keypoint's Gaussian in units of z: one cell of the 21 x 21 map
-SIGMA_START = 0.3  # a keypoint must first feel the object from afar: at 0.1 the arm takes all of them
+# a keypoint must first feel the object from afar: at 0.1 the arm takes all of them
+SIGMA_START = 0.3
 SPREAD = 0.06  # weight of `crowding`; at 0 one thing may take all K, at 0.3 some stay on the wall
 GAIN = 3.0  # of the logits: at 1 a peak of 6 among 441 cells is read as half-way to the centre
-LOOK = 0.02  # weight of `identity`; at 0 two keypoints may share arm and object as "left" and "right one"
+# weight of `identity`; at 0 two keypoints may share arm and object as "left" and "right one"
+LOOK = 0.02
 GAP = 20  # frames between the two of a pair; further apart is as good as drawn freely
-ACROSS = 0.5  # share of pairs drawn freely: within GAP frames the object has moved in only 4 of 10 pairs
+# share of pairs drawn freely: within GAP frames the object has moved in only 4 of 10 pairs
+ACROSS = 0.5
 MOTION = 10.0  # weight of what differs from the median frame, see `motion_weight`
 LEARNING_RATE = 2e-3  # falls to 0 along a cosine
 BATCH = 32
 
 
 def _block(c_in, c_out, kernel, stride):
-    # Even kernels at stride 2 keep cell i centred on pixel 4i + 1.5. Groups of one channel are instance norm.
+    # Even kernels at stride 2 keep cell i centred on pixel 4i + 1.5. Groups of one channel are
+    # instance norm.
     conv = nn.Conv2d(c_in, c_out, kernel, stride, (kernel - 1) // 2, bias=False)
     return nn.Sequential(conv, nn.GroupNorm(c_out, c_out), nn.ReLU(inplace=True))
 
@@ -57,9 +62,11 @@ def _cells(n, like):
 
 
 def soft_argmax(logits: torch.Tensor) -> torch.Tensor:
-    """Keypoints (B, K, 2) of logits (B, K, h, w): the mean position under the softmax over the whole map.
+    """Keypoints (B, K, 2) of logits (B, K, h, w): the mean position under the softmax over the
+    whole map.
 
-    Kulkarni et al. take a softmax of each marginal. Then x may come from the arm and y from the object.
+    Kulkarni et al. take a softmax of each marginal. Then x may come from the arm and y from the
+    object.
     """
     p = (GAIN * logits.flatten(2)).softmax(-1).view(logits.shape)
     x = p.sum(2) @ _cells(logits.shape[3], logits)  # (B, K)
@@ -73,14 +80,18 @@ def _bumps(z, sigma, size):
 
 
 def heat_map(z: torch.Tensor, sigma: float = SIGMA, size: int = 21) -> torch.Tensor:
-    """H (B, 1, size, size) in [0, 1] of keypoints z (B, K, 2), each a Gaussian exp(-d^2 / sigma^2)."""
+    """H (B, 1, size, size) in [0, 1] of keypoints z (B, K, 2), each a Gaussian exp(-d^2 /
+    sigma^2)."""
     g = _bumps(z, sigma, size)
     h = g[:, :, 1, :, None] * g[:, :, 0, None, :]  # (B, K, size, size)
     return 1 - (1 - h).prod(1, keepdim=True)  # a sum would exceed 1 where keypoints meet
 
 
-def transport(phi_x: torch.Tensor, phi_y: torch.Tensor, h_x: torch.Tensor, h_y: torch.Tensor) -> torch.Tensor:
-    """Eq. 6: the features of x without what stands at either frame's keypoints, and with y's at y's.
+def transport(
+    phi_x: torch.Tensor, phi_y: torch.Tensor, h_x: torch.Tensor, h_y: torch.Tensor
+) -> torch.Tensor:
+    """Eq. 6: the features of x without what stands at either frame's keypoints, and with y's at
+    y's.
 
     phi (B, C, h, w), h (B, 1, h, w) in [0, 1]. Nothing is learnt through the source x, as in
     Kulkarni et al. (2019).
@@ -90,7 +101,8 @@ def transport(phi_x: torch.Tensor, phi_y: torch.Tensor, h_x: torch.Tensor, h_y: 
 
 
 def motion_weight(y: torch.Tensor, median: torch.Tensor) -> torch.Tensor:
-    """Weight (B, 1, H, W) >= 1 of each pixel of y (B, 3, H, W): 1 + MOTION * distance from the median frame.
+    """Weight (B, 1, H, W) >= 1 of each pixel of y (B, 3, H, W): 1 + MOTION * distance from the
+    median frame.
 
     Not in the paper. A small object is 1 % of the frame; unweighted, the loss can do without it.
     """
@@ -98,30 +110,37 @@ def motion_weight(y: torch.Tensor, median: torch.Tensor) -> torch.Tensor:
 
 
 def loss(y_hat: torch.Tensor, y: torch.Tensor, weight: torch.Tensor | float = 1.0) -> torch.Tensor:
-    """Eq. 7, squared as in Kulkarni et al. (2019): a missing object costs more than a blurred edge."""
+    """Eq. 7, squared as in Kulkarni et al. (2019): a missing object costs more than a blurred
+    edge."""
     return (weight * (y_hat - y) ** 2).mean()
 
 
 def crowding(z: torch.Tensor, sigma: float) -> torch.Tensor:
-    """Mean overlap in [0, 1) of the Gaussians of different keypoints z (B, K, 2). Not in the paper."""
+    """Mean overlap in [0, 1) of the Gaussians of different keypoints z (B, K, 2). Not in the
+    paper."""
     d2 = ((z[:, :, None] - z[:, None]) ** 2).sum(-1)  # (B, K, K)
     K = z.shape[1]
-    return (torch.exp(-d2 / (2 * sigma**2)).sum((1, 2)) - K).mean() / K**2  # less the K with themselves
+    # less the K with themselves
+    return (torch.exp(-d2 / (2 * sigma**2)).sum((1, 2)) - K).mean() / K**2
 
 
 def identity(z: torch.Tensor, y: torch.Tensor) -> torch.Tensor:
-    """Variance over the batch of the mean colour under each keypoint z (B, K, 2) of y (B, 3, 84, 84).
+    """Variance over the batch of the mean colour under each keypoint z (B, K, 2) of y (B, 3, 84,
+    84).
 
-    Not in the paper. A keypoint has to be the same thing in every frame, and a thing keeps its colour.
+    Not in the paper. A keypoint has to be the same thing in every frame, and a thing keeps its
+    colour.
     """
     g = _bumps(z, SIGMA, 21)
     g = g / g.sum(-1, keepdim=True)
-    colour = torch.einsum("bkh,bkw,bchw->bkc", g[:, :, 1], g[:, :, 0], F.avg_pool2d(y, 4))  # (B, K, 3)
+    # (B, K, 3)
+    colour = torch.einsum("bkh,bkw,bchw->bkc", g[:, :, 1], g[:, :, 0], F.avg_pool2d(y, 4))
     return colour.var(0).sum(-1).mean()
 
 
 class Transporter(nn.Module):
-    """Feature encoder Phi, keypoint detector Psi and refiner R for frames (B, 3, 84, 84) in [-1, 1]."""
+    """Feature encoder Phi, keypoint detector Psi and refiner R for frames (B, 3, 84, 84) in [-1,
+    1]."""
 
     def __init__(self, K: int = 5):
         super().__init__()
@@ -140,8 +159,10 @@ class Transporter(nn.Module):
         return soft_argmax(self.psi(images))
 
     def forward(self, x, y, y_seen=None, sigma: float = SIGMA):
-        """y rebuilt from x, (B, 3, 84, 84), and y's z (B, K, 2); `y_seen` is what the detector sees of y."""
-        with torch.no_grad():  # `transport` would stop the gradient anyway; this also saves its cost
+        """y rebuilt from x, (B, 3, 84, 84), and y's z (B, K, 2); `y_seen` is what the detector sees
+        of y."""
+        # `transport` would stop the gradient anyway; this also saves its cost
+        with torch.no_grad():
             phi_x, h_x = self.phi(x), heat_map(self.keypoints(x), sigma)
         z_y = self.keypoints(y if y_seen is None else y_seen)
         return self.refiner(transport(phi_x, self.phi(y), h_x, heat_map(z_y, sigma))), z_y
@@ -152,7 +173,8 @@ def _to_network(frames):
 
 
 def _augment(y):
-    """y as a poor camera or an imperfect translation would show it; nothing moves, z must not change.
+    """y as a poor camera or an imperfect translation would show it; nothing moves, z must not
+    change.
 
     Drawn on the CPU, whose random state is in the checkpoint.
     """
@@ -165,7 +187,8 @@ def _augment(y):
 
 
 def _draw_pairs(lengths, n, rng):
-    """Indices (n,), (n,) of source and target into the joined videos; every video is target equally often."""
+    """Indices (n,), (n,) of source and target into the joined videos; every video is target equally
+    often."""
     ends = np.cumsum(lengths)
     starts = ends - lengths
     video = rng.integers(len(lengths), size=n)
@@ -185,9 +208,10 @@ def train(
 ) -> tuple[Transporter, list[dict]]:
     """Fit a Transporter on videos (T, 84, 84, 3) uint8: the translated ones and the robot's.
 
-    With robot frames as targets too, as here, the detector learns on what it later runs on; the paper
-    names only translated targets. Returns the model and a log: step, loss, and each keypoint's standard
-    deviation (near 0: glued to the background). Raises InputError for frames of another shape or type.
+    With robot frames as targets too, as here, the detector learns on what it later runs on; the
+    paper names only translated targets. Returns the model and a log: step, loss, and each
+    keypoint's standard deviation (near 0: glued to the background). Raises InputError for frames of
+    another shape or type.
     """
     for i, v in enumerate(videos):
         if v.ndim != 4 or v.shape[1:] != (84, 84, 3) or v.dtype != np.uint8 or len(v) < 2:
@@ -197,7 +221,8 @@ def train(
     checkpoint = checkpoint or Checkpoint(None)
     device, rng = pick_device(device), seed_everything(seed)
     lengths = np.array([len(v) for v in videos])
-    few = np.concatenate([v[:: len(v) // 200 + 1] for v in videos])  # 200 of each show the background
+    # 200 of each show the background
+    few = np.concatenate([v[:: len(v) // 200 + 1] for v in videos])
     median = _to_network(torch.from_numpy(np.median(few, 0)[None])).to(device)  # (1, 3, 84, 84)
     frames = torch.from_numpy(np.concatenate(videos)).to(device)
     model, log, step = Transporter(K).to(device).train(), [], 0
@@ -224,7 +249,9 @@ def train(
         y_hat, z_y = model(x, y, _augment(y), sigma)
         error = loss(y_hat, y, motion_weight(y, median))
         optimizer.zero_grad()
-        (error + SPREAD * early * crowding(z_y, sigma) + LOOK * (1 - early) * identity(z_y, y)).backward()
+        (
+            error + SPREAD * early * crowding(z_y, sigma) + LOOK * (1 - early) * identity(z_y, y)
+        ).backward()
         nn.utils.clip_grad_norm_(model.parameters(), 1.0)
         optimizer.step()
         step += 1
@@ -239,14 +266,18 @@ def train(
 
 @torch.inference_mode()
 def detect(model: Transporter, frames: np.ndarray) -> np.ndarray:
-    """Keypoints z (T, K, 2) float32 in [-1, 1], x right and y down, of frames (T, 84, 84, 3) uint8."""
+    """Keypoints z (T, K, 2) float32 in [-1, 1], x right and y down, of frames (T, 84, 84, 3)
+    uint8."""
     device = next(model.parameters()).device
     batches = torch.tensor(frames).split(64)
-    return np.concatenate([model.keypoints(_to_network(b.to(device))).cpu().numpy() for b in batches])
+    return np.concatenate(
+        [model.keypoints(_to_network(b.to(device))).cpu().numpy() for b in batches]
+    )
 
 
 def _probe(z, true_px, z_held, true_held):
-    """True and predicted pixels of a least-squares map with intercept, on frames it was not fitted on."""
+    """True and predicted pixels of a least-squares map with intercept, on frames it was not fitted
+    on."""
     if z_held is None:
         # The last quarter: neighbouring frames are near copies, so a random split would leak.
         n = 3 * len(z) // 4
@@ -256,13 +287,16 @@ def _probe(z, true_px, z_held, true_held):
 
 
 def r2(z, true_px, z_held=None, true_held=None) -> np.ndarray:
-    """R^2 (D,) <= 1 of the best linear map from z (T, K, 2) to true_px (T, D), scored on held-out frames.
+    """R^2 (D,) <= 1 of the best linear map from z (T, K, 2) to true_px (T, D), scored on held-out
+    frames.
 
-    Without a held-out set the last quarter is held out. A column that hardly moves has no meaningful R^2
-    (an object's height on a table): read its `pixel_error`.
+    Without a held-out set the last quarter is held out. A column that hardly moves has no
+    meaningful R^2 (an object's height on a table): read its `pixel_error`.
     """
     true, predicted = _probe(z, true_px, z_held, true_held)
-    return 1 - ((true - predicted) ** 2).sum(0) / np.maximum(((true - true.mean(0)) ** 2).sum(0), 1e-9)
+    return 1 - ((true - predicted) ** 2).sum(0) / np.maximum(
+        ((true - true.mean(0)) ** 2).sum(0), 1e-9
+    )
 
 
 def pixel_error(z, true_px, z_held=None, true_held=None) -> np.ndarray:
@@ -273,16 +307,23 @@ def pixel_error(z, true_px, z_held=None, true_held=None) -> np.ndarray:
 
 def save(path: Path | str, model: Transporter, task: str) -> None:
     """Write the detector of `task` with its sizes, atomically."""
-    save_state(path, {"kind": "transporter", "task": task, "K": model.K, "model": model.state_dict()})
+    save_state(
+        path, {"kind": "transporter", "task": task, "K": model.K, "model": model.state_dict()}
+    )
 
 
 def load(path: Path | str, task: str | None = None) -> Transporter:
-    """The model in a file, on the CPU. Raises InputError if the file holds another thing or another task."""
+    """The model in a file, on the CPU. Raises InputError if the file holds another thing or another
+    task."""
     saved = load_state(path)
     if saved.get("kind") != "transporter":
-        raise InputError(f"{path}: not the weights of a Transporter; give the file that its training wrote.")
+        raise InputError(
+            f"{path}: not the weights of a Transporter; give the file that its training wrote."
+        )
     if task is not None and saved["task"] != task:
-        raise InputError(f"{path}: weights of the task {saved['task']}, not of {task}; give those of {task}.")
+        raise InputError(
+            f"{path}: weights of the task {saved['task']}, not of {task}; give those of {task}."
+        )
     model = Transporter(saved["K"])
     model.load_state_dict(saved["model"])
     return model.eval()

@@ -1,8 +1,9 @@
-"""Video files, in and out. What a camera filmed becomes frames of the paper's size, checked before anything
-is learnt from them; frames of a simulator become a film that a browser plays.
+"""Video files, in and out. What a camera filmed becomes frames of the paper's size, checked before
+anything is learnt from them; frames of a simulator become a film that a browser plays.
 
-In: any file that OpenCV's FFmpeg decodes, of any size and frame rate. Out: frames (T, 84, 84, 3) uint8 RGB.
-Pauses are not cut here but on the keypoint trajectory, where stillness does not depend on light and noise.
+In: any file that OpenCV's FFmpeg decodes, of any size and frame rate. Out: frames (T, 84, 84, 3)
+uint8 RGB. Pauses are not cut here but on the keypoint trajectory, where stillness does not depend
+on light and noise.
 """
 
 from __future__ import annotations
@@ -22,23 +23,25 @@ from lbw_minimal.training import InputError, write_atomic
 SIZE = 84  # pixels, both sides of a frame
 MAX_FRAMES = 2000  # 42 MB; the human videos of the paper have 398 to 1,056
 LOOK_AT = 60  # frames that the checks of motion and camera look at, spread over the video
-# Grey levels, the local mean taken off. Sensor noise of 16 levels changes 0.04 % of a frame's pixels by
-# more, the smallest motion among our clips (a reach) 1.8 %.
+# Grey levels, the local mean taken off. Sensor noise of 16 levels changes 0.04 % of a frame's
+# pixels by more, the smallest motion among our clips (a reach) 1.8 %.
 MOVED = 16
 MOVED_SHARE = 0.005  # 35 pixels: less is noise, or an object too small for a keypoint
-# How often the steadiest two fifths of the edges stay where they are: in 0.93 of the frames and more in 20
-# rendered and 2 real clips, with noise of 8 levels too; 0.66 and less where a real clip was panned by 15
-# pixels, 0.80 where a drawn room was panned by 10, 0.43 and less where shaken by 2.
+# How often the steadiest two fifths of the edges stay where they are: in 0.93 of the frames and
+# more in 20 rendered and 2 real clips, with noise of 8 levels too; 0.66 and less where a real clip
+# was panned by 15 pixels, 0.80 where a drawn room was panned by 10, 0.43 and less where shaken by
+# 2.
 STEADY = 0.87
 EDGE = 3  # grey levels per pixel: weaker edges drown in noise
 
 
 def read(path: Path | str) -> tuple[np.ndarray, list[str]]:
-    """Frames (T, 84, 84, 3) uint8 RGB of a video, its central square shrunk, and warnings, a sentence each.
+    """Frames (T, 84, 84, 3) uint8 RGB of a video, its central square shrunk, and warnings, a
+    sentence each.
 
-    A longer video than MAX_FRAMES is thinned evenly. Only one full-size frame is held at a time. Raises
-    InputError if the file is missing, no video, cut short, shorter than two frames, smaller than 84x84, or
-    if nothing moves in it.
+    A longer video than MAX_FRAMES is thinned evenly. Only one full-size frame is held at a time.
+    Raises InputError if the file is missing, no video, cut short, shorter than two frames, smaller
+    than 84x84, or if nothing moves in it.
     """
     path = Path(path)
     if path.is_dir():
@@ -48,16 +51,24 @@ def read(path: Path | str) -> tuple[np.ndarray, list[str]]:
     with _silence():
         frames, every, count = _decode(path)
     if count == 1:
-        raise InputError(f"{path}: the video has a single frame; give one in which the arm does the task.")
+        raise InputError(
+            f"{path}: the video has a single frame; give one in which the arm does the task."
+        )
     still = _high_pass(frames)
     background = np.median(still, axis=0)  # (84, 84)
     if (np.abs(still - background) > MOVED).mean(axis=(1, 2)).max() < MOVED_SHARE:
-        raise InputError(f"{path}: nothing moves in the video; give one in which the arm does the task.")
+        raise InputError(
+            f"{path}: nothing moves in the video; give one in which the arm does the task."
+        )
     warnings = []
     if every > 1:
-        warnings.append(f"{path}: {count} frames are many; every {every}th is used, {len(frames)} in all.")
+        warnings.append(
+            f"{path}: {count} frames are many; every {every}th is used, {len(frames)} in all."
+        )
     if _steadiness(still, background) < STEADY:
-        warnings.append(f"{path}: the camera seems to move; put it on a stand, or keypoints will follow it.")
+        warnings.append(
+            f"{path}: the camera seems to move; put it on a stand, or keypoints will follow it."
+        )
     return frames, warnings
 
 
@@ -84,7 +95,8 @@ def _decode(path):
         raise InputError(f"{path}: {_why_closed(path)}")
     kept, every, count = [], 1, 0
     while film.grab():
-        if count % every == 0:  # the colours of a phone's HDR cost 0.1 s a frame: only where it is kept
+        # the colours of a phone's HDR cost 0.1 s a frame: only where it is kept
+        if count % every == 0:
             kept.append(_shrink(film.retrieve()[1], path))
             if len(kept) > MAX_FRAMES:  # the header's frame count may lie, so thin as they come
                 kept, every = kept[::2], 2 * every
@@ -117,14 +129,19 @@ def _shrink(bgr, path):
     h, w = bgr.shape[:2]
     side = min(h, w)
     if side < SIZE:
-        raise InputError(f"{path}: {w}x{h} pixels are too few; give a video of {SIZE}x{SIZE} or more.")
+        raise InputError(
+            f"{path}: {w}x{h} pixels are too few; give a video of {SIZE}x{SIZE} or more."
+        )
     top, left = (h - side) // 2, (w - side) // 2
     square = bgr[top : top + side, left : left + side]
-    return cv2.cvtColor(cv2.resize(square, (SIZE, SIZE), interpolation=cv2.INTER_AREA), cv2.COLOR_BGR2RGB)
+    return cv2.cvtColor(
+        cv2.resize(square, (SIZE, SIZE), interpolation=cv2.INTER_AREA), cv2.COLOR_BGR2RGB
+    )
 
 
 def _high_pass(frames):
-    """Grey frames (<= LOOK_AT, 84, 84) without their local mean: what a change of exposure leaves alone."""
+    """Grey frames (<= LOOK_AT, 84, 84) without their local mean: what a change of exposure leaves
+    alone."""
     pick = np.linspace(0, len(frames) - 1, min(len(frames), LOOK_AT)).astype(int)
     grey = [cv2.cvtColor(frames[i], cv2.COLOR_RGB2GRAY).astype(np.float32) for i in pick]
     grey = [cv2.GaussianBlur(g, (3, 3), 0) for g in grey]
@@ -134,10 +151,10 @@ def _high_pass(frames):
 def _steadiness(still, background):
     """Share of the frames in which the steadiest two fifths of the edges stay within a pixel.
 
-    An edge of slope g that moves by d pixels changes the grey level there by g d. The arm hides some edges
-    of the background, and where it rests for half of the clip it has edges in it; a moving camera displaces
-    them all. What a horizontal edge cannot tell, a pan along it, goes unnoticed where the room has no other
-    edges.
+    An edge of slope g that moves by d pixels changes the grey level there by g d. The arm hides
+    some edges of the background, and where it rests for half of the clip it has edges in it; a
+    moving camera displaces them all. What a horizontal edge cannot tell, a pan along it, goes
+    unnoticed where the room has no other edges.
     """
     slope_x = cv2.Sobel(background, cv2.CV_32F, 1, 0, scale=1 / 8)
     slope_y = cv2.Sobel(background, cv2.CV_32F, 0, 1, scale=1 / 8)
@@ -150,13 +167,15 @@ def _steadiness(still, background):
 
 
 def write(path: Path | str, frames, fps: float, scale: int = 2) -> None:
-    """Write RGB uint8 frames (H, W, 3) as an mp4 that browsers play; the old file stays if anything fails.
+    """Write RGB uint8 frames (H, W, 3) as an mp4 that browsers play; the old file stays if anything
+    fails.
 
-    VP9, because its decoding is exact on every machine. Halved colour resolution is why frames are enlarged
-    `scale` times, pixel by pixel; `read` shrinks them back. Measured on 84x84 frames of the tasks: scale 1
-    takes 280 bytes a frame and moving pixels come back with a PSNR of 35 dB, scale 2 500 and 40 dB, scale 4
-    580, 41 dB and three times the time. MPEG-4 at scale 2 takes 300 bytes, 37 dB, and no browser plays it.
-    Raises InputError if there are no frames, OSError if the folder cannot be written.
+    VP9, because its decoding is exact on every machine. Halved colour resolution is why frames are
+    enlarged `scale` times, pixel by pixel; `read` shrinks them back. Measured on 84x84 frames of
+    the tasks: scale 1 takes 280 bytes a frame and moving pixels come back with a PSNR of 35 dB,
+    scale 2 500 and 40 dB, scale 4 580, 41 dB and three times the time. MPEG-4 at scale 2 takes 300
+    bytes, 37 dB, and no browser plays it. Raises InputError if there are no frames, OSError if the
+    folder cannot be written.
     """
     frames = iter(frames)
     first = next(frames, None)
@@ -165,9 +184,13 @@ def write(path: Path | str, frames, fps: float, scale: int = 2) -> None:
     size = (first.shape[1] * scale, first.shape[0] * scale)
     with tempfile.TemporaryDirectory() as folder:
         part = Path(folder) / "film.mp4"
-        film = cv2.VideoWriter(str(part), cv2.CAP_FFMPEG, cv2.VideoWriter_fourcc(*"vp09"), fps, size)
+        film = cv2.VideoWriter(
+            str(part), cv2.CAP_FFMPEG, cv2.VideoWriter_fourcc(*"vp09"), fps, size
+        )
         if not film.isOpened():
-            raise RuntimeError("this OpenCV cannot write VP9; install the version in requirements.txt.")
+            raise RuntimeError(
+                "this OpenCV cannot write VP9; install the version in requirements.txt."
+            )
         for frame in chain([first], frames):
             bgr = cv2.cvtColor(np.asarray(frame), cv2.COLOR_RGB2BGR)
             film.write(cv2.resize(bgr, size, interpolation=cv2.INTER_NEAREST))

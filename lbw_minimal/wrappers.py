@@ -1,8 +1,8 @@
 """Two Gymnasium wrappers that turn an environment of images into the paper's, for any agent.
 
 `KeypointObservation`: RGB frame O_t -> keypoints z_t = Psi(O_t). `KeypointRewardWrapper`: the
-environment's own reward is dropped for r_t of Eq. 8. What an agent sees and earns is a function of the
-frames, the demonstration and the number of steps taken, of nothing else.
+environment's own reward is dropped for r_t of Eq. 8. What an agent sees and earns is a function of
+the frames, the demonstration and the number of steps taken, of nothing else.
 """
 
 from __future__ import annotations
@@ -29,18 +29,20 @@ class KeypointObservation(gym.ObservationWrapper):
 
 
 class KeypointRewardWrapper(gym.Wrapper):
-    """r_t of a `KeypointReward` over a `KeypointObservation`; its parts go to `info["reward_parts"]`.
+    """r_t of a `KeypointReward` over a `KeypointObservation`; its parts go to
+    `info["reward_parts"]`.
 
-    The observation is z_t (2K,), as in the paper. If the reward is timed, the same z_t earns different
-    rewards at different times, so the agent has to know the time. It is told in the demonstration's own
-    coordinates: (z_t, z_t - z_{t-1}, z_{t-1} - z_{t-2}, z^E_{t+1} - z_t, clock), (8K + 1,): where everything
-    is, how it moved in the last step and in the one before, the way to where the demonstration will be, and
-    how much of that has passed, 0 to 1. The clock alone would do in theory, but then the agent has to learn
-    the demonstration by heart: on push, seed 0, with one update a step and no look back, it had not solved
-    the task after 4,000 steps, with the way it first did after 2,500. How things move decides a hit: on
-    slide, one perception, without it 0 of 10 pucks stopped at the target, with it 10. The step before tells
-    where the tip is drawn to: its goal leads it, and no frame shows a goal. Without it another perception's
-    pucks ended 5 cm too far, 3 of 10 at the target; with it 10.
+    The observation is z_t (2K,), as in the paper. If the reward is timed, the same z_t earns
+    different rewards at different times, so the agent has to know the time. It is told in the
+    demonstration's own coordinates: (z_t, z_t - z_{t-1}, z_{t-1} - z_{t-2}, z^E_{t+1} - z_t,
+    clock), (8K + 1,): where everything is, how it moved in the last step and in the one before, the
+    way to where the demonstration will be, and how much of that has passed, 0 to 1. The clock alone
+    would do in theory, but then the agent has to learn the demonstration by heart: on push, seed 0,
+    with one update a step and no look back, it had not solved the task after 4,000 steps, with the
+    way it first did after 2,500. How things move decides a hit: on slide, one perception, without
+    it 0 of 10 pucks stopped at the target, with it 10. The step before tells where the tip is drawn
+    to: its goal leads it, and no frame shows a goal. Without it another perception's pucks ended 5
+    cm too far, 3 of 10 at the target; with it 10.
     """
 
     def __init__(self, env: gym.Env, reward):
@@ -49,7 +51,10 @@ class KeypointRewardWrapper(gym.Wrapper):
         low, high = env.observation_space.low, env.observation_space.high
         if reward.timed:
             reach = high - low
-            low, high = np.concatenate([low, *3 * [-reach], [0]]), np.concatenate([high, *3 * [reach], [1]])
+            low, high = (
+                np.concatenate([low, *3 * [-reach], [0]]),
+                np.concatenate([high, *3 * [reach], [1]]),
+            )
         self.observation_space = gym.spaces.Box(np.float32(low), np.float32(high))
 
     def reset(self, **kwargs):
@@ -69,4 +74,6 @@ class KeypointRewardWrapper(gym.Wrapper):
         if not reward.timed:
             return z
         ahead = reward.target(self._t).reshape(-1) - z
-        return np.concatenate([z, z - z_1, z_1 - z_2, ahead, [reward.clock(self._t)]]).astype(np.float32)
+        return np.concatenate([z, z - z_1, z_1 - z_2, ahead, [reward.clock(self._t)]]).astype(
+            np.float32
+        )

@@ -1,8 +1,8 @@
 """The course is made from the notebooks in this folder.
 
-`python -m solutions release` writes the student version to `notebooks/`, by nbgrader's own preprocessors.
-`python -m solutions book` executes the solutions and writes them as web pages to `runs/book/`, which need no
-network: equations are MathML, pictures and scenes are in the pages.
+`python -m solutions release` writes the student version to `notebooks/`, by nbgrader's own
+preprocessors. `python -m solutions book` executes the solutions and writes them as web pages to
+`runs/book/`, which need no network: equations are MathML, pictures and scenes are in the pages.
 """
 
 from __future__ import annotations
@@ -57,7 +57,8 @@ li { margin: .7rem 0; list-style: none } ul { padding: 0 } a { color: #0072b2; f
 p { margin: .1rem 0 }
 """
 MATH = re.compile(r"(`+.*?`+)|\$\$(.+?)\$\$|\$([^$\n]+?)\$", re.DOTALL)
-GREETING = re.compile(r"(pybullet build time: .*|argv\[0\]=)\n?")  # PyBullet's, to everybody who imports it
+# PyBullet's, to everybody who imports it
+GREETING = re.compile(r"(pybullet build time: .*|argv\[0\]=)\n?")
 
 
 def sources() -> list[Path]:
@@ -67,7 +68,14 @@ def sources() -> list[Path]:
 
 def student(source: Path) -> str:
     """The student version of a solved notebook, as the text of its file."""
-    steps = [ClearSolutions, LockCells, CheckCellMetadata, ClearOutput, ClearHiddenTests, ComputeChecksums]
+    steps = [
+        ClearSolutions,
+        LockCells,
+        CheckCellMetadata,
+        ClearOutput,
+        ClearHiddenTests,
+        ComputeChecksums,
+    ]
     config = Config()
     config.NotebookExporter.preprocessors = steps
     config.ClearSolutions.code_stub = {"python": STUB}
@@ -82,7 +90,8 @@ def release() -> None:
 
 
 def execute(source: Path) -> nbformat.NotebookNode:
-    """The solved notebook with its outputs, run where students run it. Raises CellExecutionError."""
+    """The solved notebook with its outputs, run where students run it. Raises
+    CellExecutionError."""
     notebook, _ = ClearHiddenTests().preprocess(nbformat.read(source, as_version=4), {})
     where = {"metadata": {"path": str(HERE)}}
     ExecutePreprocessor(timeout=TIMEOUT, kernel_name="python3").preprocess(notebook, where)
@@ -90,7 +99,8 @@ def execute(source: Path) -> nbformat.NotebookNode:
 
 
 def mathml(found: re.Match) -> str:
-    """What `MATH` found as MathML, which browsers show without a script from the network; code as it is."""
+    """What `MATH` found as MathML, which browsers show without a script from the network; code as
+    it is."""
     return found[1] or convert(found[2] or found[3], display="block" if found[2] else "inline")
 
 
@@ -115,14 +125,18 @@ def page(notebook: nbformat.NotebookNode, source: Path) -> str:
         if cell.cell_type == "markdown":
             cell.source = MATH.sub(keep, cell.source)
         for output in list(cell.get("outputs", [])):
-            if "\r" in output.get("text", ""):  # a progress bar: as it stood at its end, and no error
+            # a progress bar: as it stood at its end, and no error
+            if "\r" in output.get("text", ""):
                 output.text, output.name = re.sub(r"[^\n]*\r", "", output.text), "stdout"
             if GREETING.fullmatch(output.get("text", "")):
                 cell.outputs.remove(output)
     exporter = HTMLExporter(embed_images=True, mathjax_url="", require_js_url="")
     exporter.exclude_anchor_links = True
-    html, _ = exporter.from_notebook_node(notebook, {"metadata": {"name": escape(opening(source)[0])}})
-    html = re.sub(r'<script type="module">.*?</script>', "", html, flags=re.DOTALL)  # mermaid, from a network
+    html, _ = exporter.from_notebook_node(
+        notebook, {"metadata": {"name": escape(opening(source)[0])}}
+    )
+    # mermaid, from a network
+    html = re.sub(r'<script type="module">.*?</script>', "", html, flags=re.DOTALL)
     html = re.sub(r"EQUATION(\d+)HERE", lambda m: equations[int(m[1])], html)
     order = sources()
     i = order.index(source)

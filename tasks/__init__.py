@@ -23,4 +23,6 @@ def id_of(name: str) -> str:
 
 
 for _name in TASKS:
-    gym.register(id_of(_name), f"tasks.{_name}:{_name.capitalize()}", max_episode_steps=module(_name).HORIZON)
+    gym.register(
+        id_of(_name), f"tasks.{_name}:{_name.capitalize()}", max_episode_steps=module(_name).HORIZON
+    )

@@ -62,9 +62,13 @@ def parse(argv):
     parser.add_argument("--threads", type=int, default=0, help="torch threads (all cores)")
     parser.add_argument("--reward", choices=("mended", "literal"), default="mended")
     parser.add_argument("--without", choices=MENDS, help="leave one mend of the reward out")
-    parser.add_argument("--jobs", type=int, default=1, help="with table and ablation: runs at a time")
+    parser.add_argument(
+        "--jobs", type=int, default=1, help="with table and ablation: runs at a time"
+    )
     parser.add_argument("--from-scratch", action="store_true", help="train perception too")
-    parser.add_argument("--weights", type=Path, help="folder with trained weights (the shipped ones)")
+    parser.add_argument(
+        "--weights", type=Path, help="folder with trained weights (the shipped ones)"
+    )
     parser.add_argument("--evaluate", action="store_true", help="only replay the shipped policy")
     parser.add_argument("--episodes", type=int, help=f"test episodes ({TEST_EPISODES})")
     parser.add_argument("--resume", action="store_true", help="go on with the run in --out")
@@ -81,7 +85,8 @@ def task_module(name):
 
 
 def record(name):
-    """Film 15 expert videos and one of random motion; demonstration and random have Table I's frames."""
+    """Film 15 expert videos and one of random motion; demonstration and random have Table I's
+    frames."""
     recipe = task_module(name).RECIPE
     folder = tasks.VIDEOS / name
     folder.mkdir(parents=True, exist_ok=True)
@@ -107,7 +112,9 @@ def run(args):
     name, module = args.what, task_module(args.what)
     recipe = dataclasses.replace(module.RECIPE, **FAST) if args.fast else module.RECIPE
     if args.reward == "literal" and args.without:
-        raise InputError(f"--without {args.without}: the literal reward has no mends; leave one of the two.")
+        raise InputError(
+            f"--without {args.without}: the literal reward has no mends; leave one of the two."
+        )
     if args.episodes is not None and args.episodes < 1:
         raise InputError(f"--episodes {args.episodes}: play at least one.")
     pick_device(args.device)  # say so before anything else if there is none
@@ -120,7 +127,9 @@ def run(args):
     for warning in warnings:
         print(f"warning: {warning}", file=sys.stderr)
     random = demo[:0] if args.video else video.read(tasks.VIDEOS / name / "random.mp4")[0]
-    perception = None if from_scratch else load_perception(args.weights or tasks.WEIGHTS / name, name)
+    perception = (
+        None if from_scratch else load_perception(args.weights or tasks.WEIGHTS / name, name)
+    )
     policy = (args.weights or tasks.WEIGHTS / name) / "policy.safetensors"
     if args.evaluate:
         sac.load(policy)
@@ -135,7 +144,9 @@ def run(args):
     command = "python -m tasks " + shlex.join(args.given)
     here.metrics["command"] = command
     here.metrics["settings"] = settings | {"recipe": dataclasses.asdict(recipe)}
-    here.metrics["machine"] = f"{platform.machine()}, {os.cpu_count()} cores, torch {torch.__version__}"
+    here.metrics["machine"] = (
+        f"{platform.machine()}, {os.cpu_count()} cores, torch {torch.__version__}"
+    )
 
     start = time.monotonic()
     films = gym.make(tasks.id_of(name)).unwrapped
@@ -157,7 +168,9 @@ def run(args):
     if from_scratch and args.video is None and "perception" not in here.metrics:
         here.metrics["perception"] = probe(tasks.id_of(name), perception, PROBE_SEED + args.seed)
 
-    episodes, first, scene = evaluate(agent, env, args.episodes or (2 if args.fast else TEST_EPISODES))
+    episodes, first, scene = evaluate(
+        agent, env, args.episodes or (2 if args.fast else TEST_EPISODES)
+    )
     here.metrics["episodes"] = episodes
     wins, n = sum(e["success"] for e in episodes), len(episodes)
     low, high = wilson(wins, n)
@@ -183,7 +196,8 @@ def run(args):
 
 
 def prepare_folder(out, settings, resume):
-    """The run's folder: the same run's if `resume`, else a new one. Raises InputError where it cannot be."""
+    """The run's folder: the same run's if `resume`, else a new one. Raises InputError where it
+    cannot be."""
     note = out / "settings.json"
     if resume:
         if not note.exists():
@@ -198,15 +212,17 @@ def prepare_folder(out, settings, resume):
                 file.unlink()
         write_atomic(note, json.dumps(settings))
     except OSError as error:
-        raise InputError(f"{out}: cannot write there ({error.strerror}); give another --out.") from None
+        raise InputError(
+            f"{out}: cannot write there ({error.strerror}); give another --out."
+        ) from None
     return out
 
 
 def evaluate(agent, env, n):
     """Test episodes of the deterministic policy: a row each, the first filmed and mirrored in 3-D.
 
-    Success is the paper's: the task is complete at some step. An episode is as long as in training, so the
-    rest of a long horizon, when the demonstration is over, gives no second chance.
+    Success is the paper's: the task is complete at some step. An episode is as long as in training,
+    so the rest of a long horizon, when the demonstration is over, gives no second chance.
     """
     rows, first, scene = [], {}, None
     for i in range(n):

@@ -1,7 +1,8 @@
 """The two arms and the Operational Space Controller that moves both (Khatib 1987).
 
-In: a goal for the arm's tip, position in metres and orientation. Out: joint torques that make the tip
-behave like a critically damped mass on springs, in all six directions alike, whatever the arm's pose:
+In: a goal for the arm's tip, position in metres and orientation. Out: joint torques that make the
+tip behave like a critically damped mass on springs, in all six directions alike, whatever the arm's
+pose:
     tau = J^T Lambda (kp e - kd v) + h + N^T M (posture),    Lambda = (J M^-1 J^T)^-1
 The robot is the Franka Panda, the human a shoulder, elbow, wrist and hand built from primitives.
 """
@@ -40,12 +41,14 @@ class ArmSpec:
 
 
 def panda() -> ArmSpec:
-    """The Franka Panda of pybullet_data, fingers fixed 3 cm apart, drawn with its low-polygon meshes."""
+    """The Franka Panda of pybullet_data, fingers fixed 3 cm apart, drawn with its low-polygon
+    meshes."""
     folder = Path(pybullet_data.getDataPath()) / "franka_panda"
     urdf = (folder / "panda.urdf").read_text()
     # The visual meshes cost ten times the rendering time of the collision meshes.
     urdf = urdf.replace("meshes/visual", "meshes/collision").replace("package://", f"{folder}/")
-    # Fingers across the line of sight: they hold a pushed object from two sides, the camera sees one.
+    # Fingers across the line of sight: they hold a pushed object from two sides, the camera sees
+    # one.
     urdf = urdf.replace('type="prismatic"', 'type="fixed"')
     for side in (1, -1):
         urdf = urdf.replace('<origin rpy="0 0 0" xyz="0 0 0.0584"/>',
@@ -83,11 +86,13 @@ def limb(*profile, sides: int = 16) -> str:
     return "\n".join(rows) + "\n"
 
 
-UPPER_ARM, FOREARM, HAND = 0.34, 0.36, 0.19  # m, shoulder to elbow, elbow to wrist, wrist to fingertip
+# m, shoulder to elbow, elbow to wrist, wrist to fingertip
+UPPER_ARM, FOREARM, HAND = 0.34, 0.36, 0.19
 
 
 def human() -> ArmSpec:
-    """A human-like arm: seven joints, a sleeve to the elbow, a hand with four fingers and a thumb."""
+    """A human-like arm: seven joints, a sleeve to the elbow, a hand with four fingers and a
+    thumb."""
 
     def shape(kind, size, xyz, rpy=(0, 0, 0)):
         what = {
@@ -99,7 +104,8 @@ def human() -> ArmSpec:
         return place + f"<geometry>{what}</geometry>"
 
     def link(name, mass, length, shapes=(), touches=False):
-        # A slender rod's inertia; a share for the muscles keeps the light hand stiff against contact.
+        # A slender rod's inertia; a share for the muscles keeps the light hand stiff against
+        # contact.
         i = mass * max(length, 0.1) ** 2 / 12 + 0.01
         body = "".join(f"<visual>{s}</visual>" for s in shapes)
         body += "".join(f"<collision>{s}</collision>" for s in shapes if touches)
@@ -117,8 +123,8 @@ def human() -> ArmSpec:
     sleeve = [shape("mesh", ("sleeve.obj",), (0, 0, 0))]
     cuff = [shape("mesh", ("cuff.obj",), (0, 0, 0))]
     forearm = [shape("mesh", ("forearm.obj",), (0, 0, 0))]
-    # The hand points down like a gripper: its x axis along the fingers, y across, z forward. Knuckles
-    # bent, fingertips together under the wrist, as one holds a pen.
+    # The hand points down like a gripper: its x axis along the fingers, y across, z forward.
+    # Knuckles bent, fingertips together under the wrist, as one holds a pen.
     palm = [
         shape("box", (0.085, 0.085, 0.045), (0.045, 0, 0)),
         shape("box", (0.05, 0.08, 0.058), (0.095, 0, 0)),
@@ -149,7 +155,9 @@ def human() -> ArmSpec:
         link("hand", 0.4, 0.15, palm + fingers + thumb, touches=True),
         link("tip", 0.01, 0.0),
     ]
-    urdf = '<robot name="human_arm">' + "".join(links) + "".join(joint(*c) for c in chain) + "</robot>"
+    urdf = (
+        '<robot name="human_arm">' + "".join(links) + "".join(joint(*c) for c in chain) + "</robot>"
+    )
     meshes = {  # (distance along the limb, radius) in m: a forearm is thickest near the elbow
         "sleeve.obj": limb((-0.04, 0.01), (0, 0.058), (0.20, 0.054), (0.34, 0.050), (0.385, 0.02)),
         "cuff.obj": limb((-0.045, 0.02), (0, 0.048), (0.09, 0.047), (0.092, 0.03)),
@@ -176,20 +184,23 @@ TIP = {"robot": "panda_grasptarget", "human": "tip"}
 class Arm:
     """One arm in a PyBullet client, its tip driven by the Operational Space Controller.
 
-    `goal` is the tip's goal position in metres; the orientation goal is always straight down. kp is the
-    stiffness in 1/s^2.
+    `goal` is the tip's goal position in metres; the orientation goal is always straight down. kp is
+    the stiffness in 1/s^2.
     """
 
     def __init__(self, client, embodiment: str, kp: float = KP):
         self.p, self.spec = client, ARMS[embodiment]()
         self.kp, self.kd = kp, 2 * np.sqrt(kp)  # critically damped
-        files = Path(tempfile.mkdtemp(prefix="lbw_arm_"))  # kept while we live: the viewer reads meshes
+        # kept while we live: the viewer reads meshes
+        files = Path(tempfile.mkdtemp(prefix="lbw_arm_"))
         weakref.finalize(self, shutil.rmtree, files, ignore_errors=True)
         for name, text in {"arm.urdf": self.spec.urdf, **self.spec.meshes}.items():
             (files / name).write_text(text)
         # The human's inertias are stated; the Panda file's are placeholders, Bullet's are better.
         flags = client.URDF_USE_INERTIA_FROM_FILE if embodiment == "human" else 0
-        self.body = client.loadURDF(str(files / "arm.urdf"), self.spec.base, useFixedBase=True, flags=flags)
+        self.body = client.loadURDF(
+            str(files / "arm.urdf"), self.spec.base, useFixedBase=True, flags=flags
+        )
         infos = [client.getJointInfo(self.body, j) for j in range(client.getNumJoints(self.body))]
         self.joints = [i[0] for i in infos if i[2] == client.JOINT_REVOLUTE]  # the 7 that turn
         self.links = {i[12].decode(): i[0] for i in infos}
@@ -210,7 +221,9 @@ class Arm:
         client.setCollisionFilterGroupMask(self.body, -1, 0, 0)
         # Bullet gives every joint a velocity motor at birth; it would brake the torques.
         n = len(self.joints)
-        client.setJointMotorControlArray(self.body, self.joints, client.VELOCITY_CONTROL, forces=[0] * n)
+        client.setJointMotorControlArray(
+            self.body, self.joints, client.VELOCITY_CONTROL, forces=[0] * n
+        )
         self._zeros, self._origin = [0.0] * n, [0.0, 0.0, 0.0]
 
     def state(self) -> tuple[np.ndarray, np.ndarray]:
@@ -236,7 +249,8 @@ class Arm:
         return np.array(self.p.calculateMassMatrix(self.body, list(q)))
 
     def reset(self, tip: np.ndarray) -> None:
-        """Put the tip at that position, pointing down, at rest, by Newton steps from the rest posture."""
+        """Put the tip at that position, pointing down, at rest, by Newton steps from the rest
+        posture."""
         q = self.home.copy()
         for _ in range(60):
             self._set(q)
@@ -248,7 +262,8 @@ class Arm:
             inverse = np.linalg.pinv(J)
             posture = self.home - q
             posture -= inverse @ (J @ posture)
-            # Short steps, and near the rest posture: a long one may land with the elbow upside down.
+            # Short steps, and near the rest posture: a long one may land with the elbow upside
+            # down.
             q = q + inverse @ error * min(1, 0.05 / length) + 0.2 * posture * (length > 1e-3)
         self.goal = np.array(tip, float)
 
@@ -264,7 +279,8 @@ class Arm:
     def prepare(self) -> None:
         """Linearise the controller about the current state, once a control step.
 
-        Within 40 ms J, M and h hardly change, so the torque is linear in q and dq: two small products.
+        Within 40 ms J, M and h hardly change, so the torque is linear in q and dq: two small
+        products.
         """
         q, dq = self.state()
         J, M = self.jacobian(q), self.mass_matrix(q)
@@ -275,10 +291,14 @@ class Arm:
         h = np.array(self.p.calculateInverseDynamics(self.body, list(q), list(dq), self._zeros))
         self._Kq = self.kp * F @ J + KP_POSTURE * NT_M
         self._Kd = self.kd * F @ J + 2 * np.sqrt(KP_POSTURE) * NT_M
-        self._bias = h + self.kp * F @ (self._error(self.goal) + J @ q) + KP_POSTURE * NT_M @ self.home
+        self._bias = (
+            h + self.kp * F @ (self._error(self.goal) + J @ q) + KP_POSTURE * NT_M @ self.home
+        )
 
     def actuate(self) -> None:
         """Send the torques for the next simulation step; Bullet forgets them after each."""
         q, dq = self.state()
         tau = np.clip(self._bias - self._Kq @ q - self._Kd @ dq, -self.effort, self.effort)
-        self.p.setJointMotorControlArray(self.body, self.joints, self.p.TORQUE_CONTROL, forces=tau.tolist())
+        self.p.setJointMotorControlArray(
+            self.body, self.joints, self.p.TORQUE_CONTROL, forces=tau.tolist()
+        )

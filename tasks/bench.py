@@ -1,7 +1,8 @@
 """How fast is it? Steps, iterations and updates a second, beside the libraries people know.
 
-Every figure is for one core. Absolute figures depend on the machine and on what else it does: read the
-ratios, which come from the same run. panda-gym and stable-baselines3 are measured where installed.
+Every figure is for one core. Absolute figures depend on the machine and on what else it does: read
+the ratios, which come from the same run. panda-gym and stable-baselines3 are measured where
+installed.
 """
 
 from __future__ import annotations
@@ -21,7 +22,8 @@ SECONDS = 5  # per figure
 
 
 def rate(train, iterations):
-    """Iterations a second of a training, the start excluded by taking the difference of two runs."""
+    """Iterations a second of a training, the start excluded by taking the difference of two
+    runs."""
     times = []
     for n in (iterations, 3 * iterations):
         start = time.perf_counter()
@@ -44,7 +46,9 @@ class PandaGymPush(gym.Wrapper):
     def __init__(self):
         import panda_gym  # noqa: F401 (registers its environments)
 
-        super().__init__(gym.make("PandaPush-v3", render_mode="rgb_array", render_width=84, render_height=84))
+        super().__init__(
+            gym.make("PandaPush-v3", render_mode="rgb_array", render_width=84, render_height=84)
+        )
 
     def step(self, action):
         out = self.env.step(action)
@@ -72,8 +76,16 @@ def main():
 
     rng = np.random.default_rng(0)
     frames = rng.integers(0, 256, (64, 84, 84, 3), np.uint8)
-    show("MUNIT", rate(lambda n: munit.train(frames, frames, iterations=n, seed=0), 10), "iterations/s")
-    show("Transporter", rate(lambda n: transporter.train([frames], iterations=n, seed=0), 10), "iterations/s")
+    show(
+        "MUNIT",
+        rate(lambda n: munit.train(frames, frames, iterations=n, seed=0), 10),
+        "iterations/s",
+    )
+    show(
+        "Transporter",
+        rate(lambda n: transporter.train([frames], iterations=n, seed=0), 10),
+        "iterations/s",
+    )
 
     obs_dim, action_dim, batch, width = 11, 3, 128, 256
     agent = sac.SAC(obs_dim, action_dim, width=width)
@@ -85,7 +97,12 @@ def main():
     show(f"SAC, width {width}, batch {batch}", ours, "updates/s")
     if installed("stable_baselines3"):
         theirs = sb3_updates(obs_dim, action_dim, batch, width)
-        show("stable-baselines3 SAC, same sizes", theirs, "updates/s", f"ours: {ours / theirs:.1f} times")
+        show(
+            "stable-baselines3 SAC, same sizes",
+            theirs,
+            "updates/s",
+            f"ours: {ours / theirs:.1f} times",
+        )
     else:
         print("stable-baselines3 is not installed: no comparison (pip install stable-baselines3)")
 

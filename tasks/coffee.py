@@ -1,8 +1,9 @@
-"""Coffee: a mug has to be pushed under the outlet of a coffee machine, in front of a restless kitchen wall.
+"""Coffee: a mug has to be pushed under the outlet of a coffee machine, in front of a restless
+kitchen wall.
 
-Sizes, way, threshold and horizon follow the Meta-World coffee push task the paper builds on; the human's
-background is cluttered and moves, as in the paper. From top to bottom: constants, scene, success, the
-expert, the recipe.
+Sizes, way, threshold and horizon follow the Meta-World coffee push task the paper builds on; the
+human's background is cluttered and moves, as in the paper. From top to bottom: constants, scene,
+success, the expert, the recipe.
 """
 
 from __future__ import annotations
@@ -61,7 +62,9 @@ class Coffee(TaskEnv):
 
     def build(self):
         if self.embodiment == "human":
-            self.lamp = self.world.sphere(0.022, (LAMP[0], WALL - 0.08, LAMP[2]), SHADE, solid=False)
+            self.lamp = self.world.sphere(
+                0.022, (LAMP[0], WALL - 0.08, LAMP[2]), SHADE, solid=False
+            )
         out, thick, tall = HANDLE
         bar = (out / 2, thick / 2, thick / 2)
         x = RADIUS + out / 2 - 0.002
@@ -70,7 +73,14 @@ class Coffee(TaskEnv):
                 ("cylinder", (RADIUS, HEIGHT), (0, 0, 0), RED, MUG_MASS, True),
                 ("box", bar, (x, 0, tall / 2), RED, 0.001, False),
                 ("box", bar, (x, 0, -tall / 2), RED, 0.001, False),
-                ("box", (thick / 2, thick / 2, (tall + thick) / 2), (x + out / 2, 0, 0), RED, 0.001, False),
+                (
+                    "box",
+                    (thick / 2, thick / 2, (tall + thick) / 2),
+                    (x + out / 2, 0, 0),
+                    RED,
+                    0.001,
+                    False,
+                ),
             ],
             (MUG_START, 0, HEIGHT / 2),
         )
@@ -92,7 +102,9 @@ class Coffee(TaskEnv):
         """Put the human's lamp where it is at this time."""
         if self.embodiment == "human":
             x = LAMP[0] + LAMP[1] * np.sin(2 * np.pi * self.time / PERIOD)
-            self.world.p.resetBasePositionAndOrientation(self.lamp, (x, WALL - 0.08, LAMP[2]), (0, 0, 0, 1))
+            self.world.p.resetBasePositionAndOrientation(
+                self.lamp, (x, WALL - 0.08, LAMP[2]), (0, 0, 0, 1)
+            )
 
     def object_position(self):
         return self.world.position(self.mug)

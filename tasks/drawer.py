@@ -1,7 +1,8 @@
-"""Drawer: a drawer stands open, and has to be pushed shut by its handle; it slides, but not by itself.
+"""Drawer: a drawer stands open, and has to be pushed shut by its handle; it slides, but not by
+itself.
 
-Way, threshold and horizon follow the Meta-World drawer task the paper builds on. From top to bottom:
-constants, scene, success, the expert, the recipe.
+Way, threshold and horizon follow the Meta-World drawer task the paper builds on. From top to
+bottom: constants, scene, success, the expert, the recipe.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ SHUT = -0.0315  # m: success from here on, the threshold of the original
 FRONT = 0.70  # m along x, the cabinet's face
 CABINET = (0.12, 0.20, 0.14)  # m, depth, width, height
 PANEL = (0.012, 0.16, 0.08)  # m, the drawer's front: thickness, width, height
-HANDLE = (0.045, 0.10, 0.044)  # m: how far it stands out, width, height; as large in the picture as a cube
+# m: how far it stands out, width, height; as large in the picture as a cube
+HANDLE = (0.045, 0.10, 0.044)
 REACH = PANEL[0] + HANDLE[0]  # m, the grip's way from the drawer's face
 HEIGHT = 0.065  # m, the handle's centre above the table
 DRAWER_MASS = 0.8  # kg
@@ -39,7 +41,9 @@ class Drawer(TaskEnv):
         self.cabinet = self.world.box(half, (FRONT + depth / 2, 0, height / 2), WOOD)
 
     def build(self):
-        half = [np.array(size) / 2 for size in (PANEL, HANDLE, (OPEN, 0.8 * PANEL[1], 0.5 * PANEL[2]))]
+        half = [
+            np.array(size) / 2 for size in (PANEL, HANDLE, (OPEN, 0.8 * PANEL[1], 0.5 * PANEL[2]))
+        ]
         self.drawer = self.world.assembly(
             [
                 ("box", half[0], (-PANEL[0] / 2, 0, 0), WOOD, DRAWER_MASS, True),
@@ -51,7 +55,9 @@ class Drawer(TaskEnv):
         )
         p = self.world.p
         # A velocity motor that wants 0 and has a limited force is dry friction.
-        p.setJointMotorControl2(self.drawer, 0, p.VELOCITY_CONTROL, targetVelocity=0, force=RAIL_FRICTION)
+        p.setJointMotorControl2(
+            self.drawer, 0, p.VELOCITY_CONTROL, targetVelocity=0, force=RAIL_FRICTION
+        )
         for link in range(3):  # it slides into the cabinet
             p.setCollisionFilterPair(self.drawer, self.cabinet, link, -1, 0)
         p.changeDynamics(self.drawer, 0, jointLowerLimit=-OPEN, jointUpperLimit=0)
@@ -60,7 +66,8 @@ class Drawer(TaskEnv):
         q = self.np_random.uniform(-OPEN, 0) if scatter else -OPEN + abs(offset[0])
         self.world.p.resetJointState(self.drawer, 0, q)
         tip, top = self.arm.goal, HEIGHT + PANEL[2] / 2 + 0.02
-        if scatter and tip[0] > FRONT + q - REACH - 2 * FINGER and tip[2] < top:  # it would be in the drawer
+        # it would be in the drawer
+        if scatter and tip[0] > FRONT + q - REACH - 2 * FINGER and tip[2] < top:
             self.arm.reset(np.array([self.WORKSPACE[0][0] + 0.01, 0, tip[2]]))
 
     def object_position(self):
@@ -76,7 +83,8 @@ class Drawer(TaskEnv):
 
     def waypoints(self):
         before = self.object_position() - (self.CONTACT + 0.02, 0, 0)
-        end = self.target_position() - (self.CONTACT - 0.02, 0, 0)  # the goal leads: friction takes as much
+        # the goal leads: friction takes as much
+        end = self.target_position() - (self.CONTACT - 0.02, 0, 0)
         return [
             Leg(before, 0.9),
             Leg(end, 1.6),

@@ -1,7 +1,8 @@
 """One page that shows all tasks: scene, demonstration, what the robot saw in it, and a rollout.
 
-In: the human videos and the trained weights that come with the kit. Out: `index.html` with the pictures in
-it, and beside it a scene for every task and arm that turns with the mouse, each a file of its own.
+In: the human videos and the trained weights that come with the kit. Out: `index.html` with the
+pictures in it, and beside it a scene for every task and arm that turns with the mouse, each a file
+of its own.
 """
 
 from __future__ import annotations
@@ -45,11 +46,14 @@ the mouse, and the robot's own view of what it learnt.</p>
 
 
 def write(out: Path) -> Path:
-    """Write the gallery into the folder `out` and return its page. Raises InputError for missing weights."""
+    """Write the gallery into the folder `out` and return its page. Raises InputError for missing
+    weights."""
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"{out}: cannot write there ({error.strerror}); give another --out.") from None
+        raise InputError(
+            f"{out}: cannot write there ({error.strerror}); give another --out."
+        ) from None
     page = [HEAD.format(css=CSS + TRIO)]
     for name in tasks.TASKS:
         demo, _ = video.read(tasks.VIDEOS / name / "expert_01.mp4")
@@ -59,15 +63,25 @@ def write(out: Path) -> Path:
         agent = sac.load(tasks.WEIGHTS / name / "policy.safetensors")
         env, _ = watched(gym.make(tasks.id_of(name)), perception, robot)
         frames, z, won = rollout(env, agent, out / f"{name}-robot.html")
-        perform(gym.make(tasks.id_of(name), embodiment="human").unwrapped, out / f"{name}-human.html")
+        perform(
+            gym.make(tasks.id_of(name), embodiment="human").unwrapped, out / f"{name}-human.html"
+        )
         shown = data_uri("image/webp", film(draw_keypoints(frames, z), FPS / 2))
         scenes = [
-            (f'<iframe loading="lazy" title="{name}, {arm}" src="{name}-{arm}.html"></iframe>', about)
-            for arm, about in (("human", "the human, who shows it"), ("robot", "the robot, as it learnt it"))
+            (
+                f'<iframe loading="lazy" title="{name}, {arm}" src="{name}-{arm}.html"></iframe>',
+                about,
+            )
+            for arm, about in (
+                ("human", "the human, who shows it"),
+                ("robot", "the robot, as it learnt it"),
+            )
         ]
         result = "what it sees at half speed: it " + ("succeeds" if won else "fails")
         trio = [*scenes, (picture(shown, f"The robot does it: {name}"), result)]
-        cells = "".join(f"<figure>{x}<figcaption>{caption}</figcaption></figure>" for x, caption in trio)
+        cells = "".join(
+            f"<figure>{x}<figcaption>{caption}</figcaption></figure>" for x, caption in trio
+        )
         columns = demonstration(demo, perception.translated, perception.z_E, FPS)
         title = escape(tasks.module(name).__doc__.partition("\n\n")[0])
         page.append(f'<section><h2>{title}</h2>{columns}<div class="trio">{cells}</div></section>')
@@ -77,7 +91,8 @@ def write(out: Path) -> Path:
 
 
 def rollout(env, agent, path):
-    """Frames, keypoints and success of one episode of the policy, whose 3-D scene goes to a file."""
+    """Frames, keypoints and success of one episode of the policy, whose 3-D scene goes to a
+    file."""
     obs, _ = env.reset(seed=SEED)
     base, K = env.unwrapped, env.get_wrapper_attr("keypoint_reward").z_E.shape[1]
     frames, z, won, over, scene = [], [], False, False, mirror(base)

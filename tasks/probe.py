@@ -1,8 +1,8 @@
 """How good is perception? The simulator knows the truth, so it can be measured, not admired.
 
 In: a trained translator and detector. Out: for the tip and the object, R^2 of a linear map from the
-keypoints z to their true pixels, on robot frames and on translated human frames that no training saw.
-The truth goes into these figures and nowhere else.
+keypoints z to their true pixels, on robot frames and on translated human frames that no training
+saw. The truth goes into these figures and nowhere else.
 """
 
 from __future__ import annotations
@@ -19,10 +19,11 @@ NAMES = ("tip_x", "tip_y", "object_x", "object_y")
 def probe(task_id: str, perception, seed: int, frames: int = 400) -> dict:
     """Figures of one task's perception, by frames filmed with seeds that no training uses.
 
-    Returns R^2 per coordinate on robot and translated frames, each with the residual in pixels, and the
-    standard deviation of every keypoint. Where something is touched, also the way from tip to object in
-    pixels while the object moves, as the keypoints show it in the translated demonstration and in a
-    robot expert's film: they agree if the translated gripper touches what it seems to push.
+    Returns R^2 per coordinate on robot and translated frames, each with the residual in pixels, and
+    the standard deviation of every keypoint. Where something is touched, also the way from tip to
+    object in pixels while the object moves, as the keypoints show it in the translated
+    demonstration and in a robot expert's film: they agree if the translated gripper touches what it
+    seems to push.
     """
     robot = gym.make(task_id, embodiment="robot").unwrapped
     human = gym.make(task_id, embodiment="human").unwrapped
@@ -34,7 +35,8 @@ def probe(task_id: str, perception, seed: int, frames: int = 400) -> dict:
     sets = {
         "robot": (z[:frames], truth[:frames], z[frames:], truth[frames:]),
         "translated": (z_v[:half], v_truth[:half], z_v[half:], v_truth[half:]),
-        # The robot's map applied to translated frames: do both put the same thing in the same place?
+        # The robot's map applied to translated frames: do both put the same thing in the same
+        # place?
         "transfer": (z[:frames], truth[:frames], z_v, v_truth),
     }
     out = {}
@@ -49,7 +51,10 @@ def probe(task_id: str, perception, seed: int, frames: int = 400) -> dict:
     if robot.CONTACT:
         pixels = linear(z[:frames], truth[:frames])
         expert = perception.detect(record_expert(robot, seed)[0])
-        out["contact_px"] = {"demonstration": gap(pixels(perception.z_E)), "robot": gap(pixels(expert))}
+        out["contact_px"] = {
+            "demonstration": gap(pixels(perception.z_E)),
+            "robot": gap(pixels(expert)),
+        }
     out["keypoint_std"] = np.round(z.reshape(len(z), -1).std(0), 3).tolist()
     return out
 
@@ -61,7 +66,8 @@ def in_picture(film, truth):
 
 
 def gap(px):
-    """Mean x from tip to object over the frames (T, 4) in which the object moves by half a pixel or more."""
+    """Mean x from tip to object over the frames (T, 4) in which the object moves by half a pixel or
+    more."""
     moving = np.abs(np.gradient(px[:, 2])) > 0.5
     return round(float((px[moving, 2] - px[moving, 0]).mean()), 2)
 

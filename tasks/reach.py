@@ -36,7 +36,8 @@ class Reach(TaskEnv):
         return self.distance() < SUCCESS
 
     def waypoints(self):
-        return [Leg(np.array(TARGET), 1.0), Leg(np.array(TARGET), 0.2)]  # the tip lags its goal by 2 / 20 s
+        # the tip lags its goal by 2 / 20 s
+        return [Leg(np.array(TARGET), 1.0), Leg(np.array(TARGET), 0.2)]
 
 
 RECIPE = Recipe(human_frames=1056, robot_frames=3150)

@@ -1,7 +1,8 @@
-"""Slide: a puck on a slippery table has to come to rest at a target that no arm reaches: a hit, well dosed.
+"""Slide: a puck on a slippery table has to come to rest at a target that no arm reaches: a hit,
+well dosed.
 
-Sizes, friction, distance and horizon follow the Fetch slide task the paper builds on. From top to bottom:
-constants, scene, success, the expert, the recipe.
+Sizes, friction, distance and horizon follow the Fetch slide task the paper builds on. From top to
+bottom: constants, scene, success, the expert, the recipe.
 """
 
 from __future__ import annotations
@@ -27,7 +28,8 @@ class Slide(TaskEnv):
     __doc__ = __doc__
     CAMERA = ((0.71, 0.0, 0.20), 1.58)  # m: 70 cm fill the image
     STEP, LEASH = 0.04, 0.06  # m: 1 m/s at full action
-    KP = 1600.0  # 1/s^2: at 400 the tip lags a hit by 9 cm, which hides in the goal what the puck will do
+    # 1/s^2: at 400 the tip lags a hit by 9 cm, which hides in the goal what the puck will do
+    KP = 1600.0
     WORKSPACE = ((0.42, -0.002, 0.015), (0.64, 0.002, 0.28))
     START = (0.46, 0.0, 0.15)
     CONTACT = RADIUS + FINGER
@@ -36,7 +38,9 @@ class Slide(TaskEnv):
         self.world.cylinder(0.03, 0.001, (TARGET, 0, 0.0005), GREEN, solid=False)
 
     def build(self):
-        self.puck = self.world.cylinder(RADIUS, HEIGHT, (PUCK_START, 0, HEIGHT / 2), RED, mass=PUCK_MASS)
+        self.puck = self.world.cylinder(
+            RADIUS, HEIGHT, (PUCK_START, 0, HEIGHT / 2), RED, mass=PUCK_MASS
+        )
         self.world.p.changeDynamics(self.puck, -1, lateralFriction=PUCK_FRICTION)
 
     def place(self, offset, scatter):
@@ -64,6 +68,6 @@ class Slide(TaskEnv):
         ]
 
 
-# Four times the others' policy steps: after 10,000 some hits of two policies in three, all trained on one
-# perception with lambda 1 and 1, still sent the puck 5 cm too far.
+# Four times the others' policy steps: after 10,000 some hits of two policies in three, all trained
+# on one perception with lambda 1 and 1, still sent the puck 5 cm too far.
 RECIPE = Recipe(human_frames=650, robot_frames=2120, policy_steps=20_000)

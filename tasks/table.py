@@ -1,8 +1,9 @@
 """The tables of results: what is missing is run first, what is finished is not repeated.
 
-`python -m tasks table`: the paper's Table II, LbW row, five tasks and three seeds, mended and literal reward.
-`python -m tasks ablation`: what mends the reward, switched off one at a time. Out: Markdown and JSON, and for
-the ablation a picture, in `runs/table/`; every run has a folder of its own there.
+`python -m tasks table`: the paper's Table II, LbW row, five tasks and three seeds, mended and
+literal reward. `python -m tasks ablation`: what mends the reward, switched off one at a time. Out:
+Markdown and JSON, and for the ablation a picture, in `runs/table/`; every run has a folder of its
+own there.
 """
 
 from __future__ import annotations
@@ -28,7 +29,8 @@ ABLATED = ("push", "slide")
 
 
 def folder(out: Path, task: str, seed: int, change: str = "") -> Path:
-    """Where the run of a task and seed is; change: "" (the recipe), "literal", or the mend left out."""
+    """Where the run of a task and seed is; change: "" (the recipe), "literal", or the mend left
+    out."""
     return out / (f"{task}-{seed}-{change}" if change else f"{task}-{seed}")
 
 
@@ -50,7 +52,8 @@ def command(out: Path, task: str, seed: int, change: str) -> list[str]:
 
 
 def run_missing(out: Path, wanted: list[tuple[str, int, str]], jobs: int) -> None:
-    """Run what is not finished, `jobs` at a time, perception first. Raises InputError if a run fails."""
+    """Run what is not finished, `jobs` at a time, perception first. Raises InputError if a run
+    fails."""
 
     def run(job):
         path = folder(out, *job)
@@ -66,7 +69,9 @@ def run_missing(out: Path, wanted: list[tuple[str, int, str]], jobs: int) -> Non
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"{out}: cannot write there ({error.strerror}); give another --out.") from None
+        raise InputError(
+            f"{out}: cannot write there ({error.strerror}); give another --out."
+        ) from None
     bases = list(dict.fromkeys((task, seed, "") for task, seed, _ in wanted))
     with ThreadPoolExecutor(jobs) as pool:
         for some in (bases, [job for job in wanted if job[2]]):
@@ -129,16 +134,31 @@ def table(out: Path, jobs: int) -> str:
             [task, f"{PAPER[task]} %" if task in PAPER else "-", percent(mended), each(mended),
              percent(literal), each(literal), f"{minutes:.0f} min", f"{mended[0]['steps']:,}"]
         )  # fmt: skip
-        quality += [[task, str(r["seed"]), r_squared(r, "robot"), r_squared(r, "translated")] for r in mended]
+        quality += [
+            [task, str(r["seed"]), r_squared(r, "robot"), r_squared(r, "translated")]
+            for r in mended
+        ]
     text = markdown(
-        ["task", "paper", "mended (95 % interval)", "by seed", "literal", "by seed", "time", "policy steps"],
+        [
+            "task",
+            "paper",
+            "mended (95 % interval)",
+            "by seed",
+            "literal",
+            "by seed",
+            "time",
+            "policy steps",
+        ],
         rows,
     )
     text += "\n" + markdown(
-        ["task", "seed", "R² of tip x / y, object x / y on robot frames", "on translated frames"], quality
+        ["task", "seed", "R² of tip x / y, object x / y on robot frames", "on translated frames"],
+        quality,
     )
     write_atomic(out / "table.md", text)
-    write_atomic(out / "table.json", json.dumps([r for some in runs.values() for r in some], indent=1) + "\n")
+    write_atomic(
+        out / "table.json", json.dumps([r for some in runs.values() for r in some], indent=1) + "\n"
+    )
     return text
 
 
@@ -155,8 +175,12 @@ def ablation(out: Path, jobs: int) -> str:
     ]
     text = markdown(head, rows)
     write_atomic(out / "ablation.md", text)
-    write_atomic(out / "ablation.json", json.dumps([r for x in runs.values() for r in x], indent=1) + "\n")
-    bars({names[c]: [runs[t, c] for t in ABLATED] for c in changes}).savefig(out / "ablation.png", dpi=110)
+    write_atomic(
+        out / "ablation.json", json.dumps([r for x in runs.values() for r in x], indent=1) + "\n"
+    )
+    bars({names[c]: [runs[t, c] for t in ABLATED] for c in changes}).savefig(
+        out / "ablation.png", dpi=110
+    )
     return text
 
 
@@ -174,7 +198,10 @@ def bars(rows: dict[str, list[list[dict]]]) -> Figure:
             axis.errorbar(mean, y, xerr=bounds, fmt="none", ecolor="black", capsize=2, lw=1)
         axis.set_yticks(range(len(rows)), rows)
         axis.invert_yaxis()
-        axis.set(xlim=(0, 100), xlabel="test episodes that succeed, three seeds together (%), 95 % interval")
+        axis.set(
+            xlim=(0, 100),
+            xlabel="test episodes that succeed, three seeds together (%), 95 % interval",
+        )
         axis.grid(axis="y", visible=False)
         figure.legend(loc="outside upper right", ncols=2)
     return figure

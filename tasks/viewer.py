@@ -1,10 +1,13 @@
-"""The meshcat mirror of a PyBullet scene, recorded to one HTML page without a server, port or process.
+"""The meshcat mirror of a PyBullet scene, recorded to one HTML page without a server, port or
+process.
 
-In: a client and the poses its links pass through. Out: a page in which the scene plays and turns with the
-mouse. A link's frame is animated; its shapes hang below it where the URDF puts them, so the browser computes
-    world <- link (URDF frame, animated) <- visual frame (fixed) <- drawing (fixed, e.g. y up to z up)
-Traps: the pose of a base is its centre of mass, not its frame; meshcat's cylinders lie along y, Bullet's
-along z; meshcat has no capsule.
+In: a client and the poses its links pass through. Out: a page in which the scene plays and turns
+with the mouse. A link's frame is animated; its shapes hang below it where the URDF puts them, so
+the browser computes
+    world <- link (URDF frame, animated) <- visual frame (fixed) <- drawing (fixed, e.g. y up to z
+    up)
+Traps: the pose of a base is its centre of mass, not its frame; meshcat's cylinders lie along y,
+Bullet's along z; meshcat has no capsule.
 """
 
 from __future__ import annotations
@@ -26,10 +29,14 @@ from meshcat.animation import Animation, AnimationClip, AnimationTrack
 from lbw_minimal.training import write_atomic
 from tasks.world import TaskEnv
 
-EYE, TARGET = (0.5, -1.2, 0.45), (0.42, 0.0, 0.22)  # m, from the side, like the environments' camera
-FOV = 46  # degrees, from bottom to top: the whole arm, where the environments' camera frames the skill
-CREASE = np.cos(np.radians(40))  # faces that meet at less than this angle are shaded as one round surface
-Y_TO_Z = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1.0]])  # turned by 90 degrees about x
+# m, from the side, like the environments' camera
+EYE, TARGET = (0.5, -1.2, 0.45), (0.42, 0.0, 0.22)
+# degrees, from bottom to top: the whole arm, where the environments' camera frames the skill
+FOV = 46
+# faces that meet at less than this angle are shaded as one round surface
+CREASE = np.cos(np.radians(40))
+# turned by 90 degrees about x
+Y_TO_Z = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1.0]])
 
 PAGE = """<!DOCTYPE html>
 <html lang="en">
@@ -75,13 +82,17 @@ class Mesh(g.Geometry):
 
     def lower(self, object_data):
         arrays = {"position": self.corners, "normal": normals(self.corners)}
-        attributes = {k: g.pack_numpy_array(a.reshape(-1, 3).T.astype(np.float32)) for k, a in arrays.items()}
+        attributes = {
+            k: g.pack_numpy_array(a.reshape(-1, 3).T.astype(np.float32)) for k, a in arrays.items()
+        }
         return {"uuid": self.uuid, "type": "BufferGeometry", "data": {"attributes": attributes}}
 
 
 def normals(corners: np.ndarray) -> np.ndarray:
-    """Unit normals (F, 3, 3) at triangles' corners: the mean of the faces that meet there without crease."""
-    face = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])  # (F, 3), length 2 x area
+    """Unit normals (F, 3, 3) at triangles' corners: the mean of the faces that meet there without
+    crease."""
+    # (F, 3), length 2 x area
+    face = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     unit = face / np.maximum(np.linalg.norm(face, axis=1, keepdims=True), 1e-30)
     # Files repeat a vertex for every face, so equal places make a corner, not equal indices.
     size = max(np.ptp(corners.reshape(-1, 3), axis=0).max(), 1e-30)
@@ -98,10 +109,12 @@ def normals(corners: np.ndarray) -> np.ndarray:
 
 
 def read_mesh(path: Path | str) -> np.ndarray:
-    """Triangles (F, 3, 3) of a Wavefront OBJ or binary STL file. Raises ValueError for any other."""
+    """Triangles (F, 3, 3) of a Wavefront OBJ or binary STL file. Raises ValueError for any
+    other."""
     path = Path(path)
     if path.suffix.lower() == ".stl":
-        data = np.fromfile(path, np.uint8)[80:]  # an 80-byte title, the count, then 50 bytes a triangle
+        # an 80-byte title, the count, then 50 bytes a triangle
+        data = np.fromfile(path, np.uint8)[80:]
         count = data[:4].view("<u4")[0] if len(data) >= 4 else -1
         if len(data) != 4 + 50 * int(count):
             raise ValueError(f"{path.name}: not a binary STL file; export it as one.")
@@ -130,7 +143,8 @@ def transform(position, quaternion) -> np.ndarray:
 
 
 def drawing(kind: int, size, file: str) -> list[tuple[g.Geometry, np.ndarray]]:
-    """What draws a visual shape of `getVisualShapeData`: geometries, each with its 4x4 place in its frame."""
+    """What draws a visual shape of `getVisualShapeData`: geometries, each with its 4x4 place in its
+    frame."""
     at = np.eye(4)
     if kind == p.GEOM_BOX:
         return [(g.Box([*size]), at)]  # full lengths
@@ -139,7 +153,10 @@ def drawing(kind: int, size, file: str) -> list[tuple[g.Geometry, np.ndarray]]:
     if kind == p.GEOM_CYLINDER:
         return [(g.Cylinder(size[0], size[1]), Y_TO_Z)]
     if kind == p.GEOM_CAPSULE:
-        ends = [(g.Sphere(size[1]), transform((0, 0, z), (0, 0, 0, 1))) for z in (-size[0] / 2, size[0] / 2)]
+        ends = [
+            (g.Sphere(size[1]), transform((0, 0, z), (0, 0, 0, 1)))
+            for z in (-size[0] / 2, size[0] / 2)
+        ]
         return [(g.Cylinder(size[0], size[1]), Y_TO_Z), *ends]
     if kind == p.GEOM_MESH:
         return [(Mesh(read_mesh(file) * size), at)]
@@ -151,13 +168,15 @@ def drawing(kind: int, size, file: str) -> list[tuple[g.Geometry, np.ndarray]]:
 class Recorder:
     """Records the bodies of a PyBullet client for the browser: all of them, or those listed by id.
 
-    Shapes and colours are read now, poses at every `snap`. Raises ValueError for a shape it cannot draw.
+    Shapes and colours are read now, poses at every `snap`. Raises ValueError for a shape it cannot
+    draw.
     """
 
     def __init__(self, client: int, bodies=None):
         self.client, self.eye, self.target = client, EYE, TARGET  # m: where one looks from, and at
         self.world = None  # of a task's environment, whose scenery is shown for a picture only
-        self.frames = []  # an array (L, 7) each: position in m and quaternion (x, y, z, w) of every link
+        # an array (L, 7) each: position in m and quaternion (x, y, z, w) of every link
+        self.frames = []
         self.shapes = []  # (link's row, geometry, 4x4 place in the link's frame, rgba)
         self.links = []  # (body, link) with something to draw; the base is link -1
         if bodies is None:
@@ -179,7 +198,9 @@ class Recorder:
     def _pose(self, body, link):
         """Position and quaternion of a link's URDF frame, in which its visual frames are given."""
         if link >= 0:
-            return p.getLinkState(body, link, computeForwardKinematics=True, physicsClientId=self.client)[4:6]
+            return p.getLinkState(
+                body, link, computeForwardKinematics=True, physicsClientId=self.client
+            )[4:6]
         mass = p.getBasePositionAndOrientation(body, self.client)
         inertial = p.getDynamicsInfo(body, -1, self.client)[3:5]
         return p.multiplyTransforms(*mass, *p.invertTransform(*inertial))
@@ -199,7 +220,9 @@ class Recorder:
         scene["/Background"].set_property("bottom_color", [0.80, 0.82, 0.85])
         for i, (row, geometry, at, rgba) in enumerate(self.shapes):
             r, green, b = (round(255 * c) for c in rgba[:3])
-            mesh = g.Mesh(geometry, g.MeshPhongMaterial(color=r << 16 | green << 8 | b, opacity=rgba[3]))
+            mesh = g.Mesh(
+                geometry, g.MeshPhongMaterial(color=r << 16 | green << 8 | b, opacity=rgba[3])
+            )
             # Ids of meshcat's own making carry the computer's network address.
             mesh.uuid, geometry.uuid, mesh.material.uuid = (
                 f"{part}{i}" for part in ("mesh", "shape", "paint")
@@ -217,7 +240,9 @@ class Recorder:
                 path = [*poses[:, row].tolist(), poses[-1, row].tolist()]
                 tracks = {
                     "position": AnimationTrack("position", "vector3", times, [x[:3] for x in path]),
-                    "quaternion": AnimationTrack("quaternion", "quaternion", times, [x[3:] for x in path]),
+                    "quaternion": AnimationTrack(
+                        "quaternion", "quaternion", times, [x[3:] for x in path]
+                    ),
                 }
                 animation.clips[node.path] = AnimationClip(tracks, fps)
         if animation.clips:
@@ -244,7 +269,8 @@ class Recorder:
         rgba = p.getCameraImage(*size, view, lens, lightDirection=(0.3, -1, 1.6), **options)[2]
         if self.world:
             self.world.show_scenery(False)
-        rgb = np.reshape(np.uint8(rgba), (size[1], size[0], 4))[..., 2::-1]  # OpenCV writes blue first
+        # OpenCV writes blue first
+        rgb = np.reshape(np.uint8(rgba), (size[1], size[0], 4))[..., 2::-1]
         return cv2.imencode(".png", rgb)[1].tobytes()
 
     def _repr_html_(self) -> str:
@@ -257,7 +283,8 @@ class Recorder:
         if not p.isConnected(self.client):
             return scene
         png = f"data:image/png;base64,{base64.b64encode(self.picture()).decode()}"
-        nothing = "data:image/gif;base64,R0lGODlhAQABAAAAACH5BAEKAAEALAAAAAABAAEAAAICTAEAOw=="  # 1 x 1, clear
+        # 1 x 1, clear
+        nothing = "data:image/gif;base64,R0lGODlhAQABAAAAACH5BAEKAAEALAAAAAABAAEAAAICTAEAOw=="
         return (
             f'{scene}<picture><source media="not print" srcset="{nothing}">'
             f'<img alt="the scene" src="{png}"></picture>'
@@ -269,7 +296,8 @@ class Recorder:
 
 
 def mirror(env) -> Recorder:
-    """A recorder of a task's environment, scenery included, that frames what its camera does and the arm."""
+    """A recorder of a task's environment, scenery included, that frames what its camera does and
+    the arm."""
     env.world.show_scenery(True)
     recorder = Recorder(env.world.client)
     recorder.world = env.world
@@ -282,11 +310,13 @@ def mirror(env) -> Recorder:
 
 
 def pack(command) -> bytes:
-    """A meshcat command as its viewer expects it; four bytes a number hold 0.1 micrometre at 1 m."""
+    """A meshcat command as its viewer expects it; four bytes a number hold 0.1 micrometre at 1
+    m."""
     return umsgpack.packb(command.lower(), force_float_precision="single")
 
 
 def y_up(point) -> str:
-    """A point in m for the camera, whose y axis points up where ours is z: x, z, -y as JavaScript."""
+    """A point in m for the camera, whose y axis points up where ours is z: x, z, -y as
+    JavaScript."""
     x, y, z = point
     return f"{float(x)}, {float(z)}, {float(-y)}"

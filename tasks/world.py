@@ -1,7 +1,9 @@
-"""What the five tasks share: table, wall, camera, light, the arm, and Gymnasium's reset, step, render.
+"""What the five tasks share: table, wall, camera, light, the arm, and Gymnasium's reset, step,
+render.
 
-A task file subclasses `TaskEnv` and says what stands on the table, when it is done, and how an expert
-does it. The camera looks from the side along y: x goes right in the image, z up. Lengths in metres.
+A task file subclasses `TaskEnv` and says what stands on the table, when it is done, and how an
+expert does it. The camera looks from the side along y: x goes right in the image, z up. Lengths in
+metres.
 """
 
 from __future__ import annotations
@@ -41,21 +43,32 @@ with _silence():
 from tasks.arm import KP, Arm  # noqa: E402 (after the silenced import)
 
 SIZE = 84  # pixels, both sides of every frame
-SUPERSAMPLE = 2  # the renderer does not smooth edges; averaging lets a frame show motion below a pixel
+# the renderer does not smooth edges; averaging lets a frame show motion below a pixel
+SUPERSAMPLE = 2
 DT = 1 / 250  # s, one simulation step
 SUBSTEPS = 10  # simulation steps per control step: 25 Hz
 TABLE_FRICTION = 1.0  # Bullet multiplies it with the object's own
-FINGER = 0.012  # m, half the thickness of gripper and fingers: what the tip stands behind a thing it pushes
+# m, half the thickness of gripper and fingers: what the tip stands behind a thing it pushes
+FINGER = 0.012
 
 CAMERA_PITCH, CAMERA_FOV = -12.0, 25.0  # degrees
 
 LOW = 0.035  # m above the lowest tip: here a tip beside an object touches it
 
 RED, GREEN = (0.78, 0.12, 0.10, 1), (0.15, 0.60, 0.25, 1)
-# Middle tones: a tanh decoder saturates on white, and translation swaps extreme wall and table tones.
+# Middle tones: a tanh decoder saturates on white, and translation swaps extreme wall and table
+# tones.
 LOOKS = {
-    "robot": {"wall": (0.56, 0.60, 0.64, 1), "table": (0.36, 0.38, 0.42, 1), "light": (0.3, -1.0, 1.6)},
-    "human": {"wall": (0.68, 0.63, 0.54, 1), "table": (0.50, 0.36, 0.25, 1), "light": (-0.5, -1.0, 1.4)},
+    "robot": {
+        "wall": (0.56, 0.60, 0.64, 1),
+        "table": (0.36, 0.38, 0.42, 1),
+        "light": (0.3, -1.0, 1.6),
+    },
+    "human": {
+        "wall": (0.68, 0.63, 0.54, 1),
+        "table": (0.50, 0.36, 0.25, 1),
+        "light": (-0.5, -1.0, 1.4),
+    },
 }
 
 
@@ -64,7 +77,8 @@ class Leg(NamedTuple):
 
     end: np.ndarray
     seconds: float
-    dosed: bool = False  # its speed decides: a human's leg that is never bent, slower, or followed by a rest
+    # its speed decides: a human's leg that is never bent, slower, or followed by a rest
+    dosed: bool = False
 
 
 class World:
@@ -93,19 +107,22 @@ class World:
         self.depth = np.full((size, size), 0.999, np.float32)  # 1 is where nothing is
 
     def paint(self) -> None:
-        """Take what has been built so far as scenery: it is rendered now, with its depth, and never again."""
+        """Take what has been built so far as scenery: it is rendered now, with its depth, and never
+        again."""
         self.scenery = [self.p.getBodyUniqueId(i) for i in range(self.p.getNumBodies())]
         self.backdrop, self.depth = self._composite()
         self.show_scenery(False)
 
     def show_scenery(self, visible: bool) -> None:
-        """Show the scenery to whoever reads the scene, like the 3-D viewer, or leave it to the backdrop."""
+        """Show the scenery to whoever reads the scene, like the 3-D viewer, or leave it to the
+        backdrop."""
         for body in self.scenery:
             rgba = (*self.p.getVisualShapeData(body)[0][7][:3], float(visible))
             self.p.changeVisualShape(body, -1, rgbaColor=rgba)
 
     def box(self, half, position, rgba, mass=0.0, solid=True) -> int:
-        """Add a box of half extents `half`; static where `mass` (kg) is 0, untouchable if not solid."""
+        """Add a box of half extents `half`; static where `mass` (kg) is 0, untouchable if not
+        solid."""
         return self._body("box", half, position, rgba, mass, solid)
 
     def cylinder(self, radius, height, position, rgba, mass=0.0, solid=True) -> int:
@@ -123,10 +140,11 @@ class World:
         return body
 
     def assembly(self, parts, position, slides=None) -> int:
-        """Add one movable body of several parts (kind, size, place, rgba, mass, solid), fixed to each other.
+        """Add one movable body of several parts (kind, size, place, rgba, mass, solid), fixed to
+        each other.
 
-        kind and size as above, place relative to `position`. With `slides`, an axis, the whole hangs on a
-        prismatic joint, number 0, of a base that stands fast.
+        kind and size as above, place relative to `position`. With `slides`, an axis, the whole
+        hangs on a prismatic joint, number 0, of a base that stands fast.
         """
         shapes = [self._shapes(kind, size, rgba, solid) for kind, size, _, rgba, _, solid in parts]
         visual, collision = ([pair[i] for pair in shapes] for i in (0, 1))
@@ -178,7 +196,8 @@ class World:
         return cv2.resize(self._composite()[0], (SIZE, SIZE), interpolation=cv2.INTER_AREA)
 
     def _composite(self):
-        """What moves, rendered over the backdrop at SUPERSAMPLE times the size, and the depth of it all."""
+        """What moves, rendered over the backdrop at SUPERSAMPLE times the size, and the depth of it
+        all."""
         size = SIZE * SUPERSAMPLE
         _, _, rgba, depth, _ = self.p.getCameraImage(
             size, size, self.view, self.projection, lightDirection=self.light, shadow=0,
@@ -207,20 +226,22 @@ class TaskEnv(gym.Env):
     """A task of the paper as a Gymnasium environment.
 
     Observation: (84, 84, 3) uint8 RGB; with `observation="state"` the simulator's truth instead,
-    (tip, object, target) in metres, for lessons and tests only: the method never uses it.
-    Action: (3,) in [-1, 1], a step of the tip's goal along x, y, z, at full action `STEP` metres.
-    `embodiment`: "robot" or "human". `jitter`: how far, in metres, the start pose may be off the fixed
-    configuration. reset(options={"scatter": True}) puts the object anywhere, for random data.
+    (tip, object, target) in metres, for lessons and tests only: the method never uses it. Action:
+    (3,) in [-1, 1], a step of the tip's goal along x, y, z, at full action `STEP` metres.
+    `embodiment`: "robot" or "human". `jitter`: how far, in metres, the start pose may be off the
+    fixed configuration. reset(options={"scatter": True}) puts the object anywhere, for random data.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 25}
 
     # Every task states these; the values here are what most tasks use.
     STEP = 0.03  # m, the tip's goal moves this far per control step at full action
-    # How far, in m, the goal may run ahead of the tip. No frame shows the goal: the policy has to infer it
-    # from how the tip moved. One that saw z_t alone solved push in no episode with 0.05 instead of 0.03.
+    # How far, in m, the goal may run ahead of the tip. No frame shows the goal: the policy has to
+    # infer it from how the tip moved. One that saw z_t alone solved push in no episode with 0.05
+    # instead of 0.03.
     LEASH = 0.03
-    CAMERA = ((0.56, 0.0, 0.145), 1.15)  # m: half a metre fills the image, a 5 cm object is 8 pixels wide
+    # m: half a metre fills the image, a 5 cm object is 8 pixels wide
+    CAMERA = ((0.56, 0.0, 0.145), 1.15)
     KP = KP  # 1/s^2, stiffness of the arm's tip
     WORKSPACE = ((0.42, -0.01, 0.015), (0.74, 0.01, 0.17))  # m, box of the tip's goal
     START = (0.46, 0.0, 0.12)  # m, the tip at reset
@@ -248,7 +269,8 @@ class TaskEnv(gym.Env):
         self.world.take_apart()
         self._apart = self.world.p.saveState()
 
-    # What a task file writes ------------------------------------------------------------------------
+    # What a task file writes
+    # ------------------------------------------------------------------------
 
     def furnish(self) -> None:
         """Add what never moves to `self.world`."""
@@ -276,12 +298,14 @@ class TaskEnv(gym.Env):
         """The expert's way from the start."""
         raise NotImplementedError
 
-    # Gymnasium --------------------------------------------------------------------------------------
+    # Gymnasium
+    # --------------------------------------------------------------------------------------
 
     def reset(self, *, seed=None, options=None):
         super().reset(seed=seed)
         self.world.p.restoreState(self._apart)
-        self.world.p.performCollisionDetection()  # Bullet forgets contacts of the last episode only so
+        # Bullet forgets contacts of the last episode only so
+        self.world.p.performCollisionDetection()
         self.world.p.restoreState(self._fresh)
         offset = self.np_random.uniform(-self.jitter, self.jitter, 4)
         scatter = bool((options or {}).get("scatter", False))
@@ -295,8 +319,8 @@ class TaskEnv(gym.Env):
         return self._observe(), self._info()
 
     def put(self, body, position, half, height, span=None) -> None:
-        """Stand a body of that half width and height (m) at `position`; with `span`, anywhere along x in
-        it where it is clear of the arm."""
+        """Stand a body of that half width and height (m) at `position`; with `span`, anywhere along
+        x in it where it is clear of the arm."""
         if span is not None:
             x, tip = self.np_random.uniform(*span), self.arm.goal
             if abs(x - tip[0]) < half + 2 * FINGER and tip[2] < height + 0.02:
@@ -305,8 +329,8 @@ class TaskEnv(gym.Env):
         self.world.p.resetBasePositionAndOrientation(body, position, (0, 0, 0, 1))
 
     def _stand_beside(self):
-        """Put the tip low and next to the object, if it is in reach: a task is about contact, and chance
-        brings little."""
+        """Put the tip low and next to the object, if it is in reach: a task is about contact, and
+        chance brings little."""
         x, low, high = self.object_position()[0], self.WORKSPACE[0][0], self.WORKSPACE[1][0]
         aside = self.np_random.uniform(self.CONTACT, self.CONTACT + 0.05)
         side = self.np_random.choice([-1, 1], p=[0.65, 0.35])
@@ -320,7 +344,8 @@ class TaskEnv(gym.Env):
         action = np.clip(np.asarray(action, float), -1, 1)
         x = self.arm.tip_pose()[0]
         goal = self.arm.goal + self.STEP * action
-        goal = np.clip(goal, x - self.LEASH, x + self.LEASH)  # the goal must not run away from a stuck tip
+        # the goal must not run away from a stuck tip
+        goal = np.clip(goal, x - self.LEASH, x + self.LEASH)
         self.arm.goal = np.clip(goal, *self.WORKSPACE)
         self.arm.prepare()
         for _ in range(SUBSTEPS):
@@ -351,7 +376,8 @@ class TaskEnv(gym.Env):
         return np.linalg.norm(self.object_position() - self.target_position())
 
     def true_pixels(self) -> np.ndarray:
-        """(4,): the tip's and the object's place in the image, in pixels; for plots and tests only."""
+        """(4,): the tip's and the object's place in the image, in pixels; for plots and tests
+        only."""
         points = self.arm.tip_pose()[0], self.object_position()
         return np.concatenate([self.world.pixel(point) for point in points])
 
@@ -395,7 +421,8 @@ def random_actions(rng: np.random.Generator, towards: float = 0.0):
 
 
 def record_random(env: TaskEnv, frames: int, seed: int, take: int = 25):
-    """Film `frames` frames of random motion in takes of `take` frames, the object put anew for each.
+    """Film `frames` frames of random motion in takes of `take` frames, the object put anew for
+    each.
 
     A take that starts next to the object moves towards it for its first half. Returns the frames
     (T, 84, 84, 3) uint8 and the true pixels (T, 4) of tip and object.

@@ -1,4 +1,5 @@
-"""The exercises themselves: references earn everything, and every anticipated mistake gets its own hint."""
+"""The exercises themselves: references earn everything, and every anticipated mistake gets its own
+hint."""
 
 import numpy as np
 import pytest
@@ -35,7 +36,9 @@ def test_the_reference_earns_every_point(exercise):
     assert result.points == result.most > 0, result.lines()
 
 
-@pytest.mark.parametrize("exercise, mistake", MISTAKES, ids=[f"{e.id}-{m.hint[:40]}" for e, m in MISTAKES])
+@pytest.mark.parametrize(
+    "exercise, mistake", MISTAKES, ids=[f"{e.id}-{m.hint[:40]}" for e, m in MISTAKES]
+)
 def test_a_mistake_costs_points_and_gets_its_own_hint(exercise, mistake):
     result = judge(exercise, trusted(exercise, exercise.wrong(mistake)))
     assert result.points < result.most

@@ -1,5 +1,6 @@
-"""Grading a class of which some crash, hang, or cheat: each gets what its answers are worth, and nobody else
-pays for it. The submissions are notebook 6, with exercise 6.1 answered in one of many bad ways."""
+"""Grading a class of which some crash, hang, or cheat: each gets what its answers are worth, and
+nobody else pays for it. The submissions are notebook 6, with exercise 6.1 answered in one of many
+bad ways."""
 
 import copy
 import csv
@@ -146,7 +147,11 @@ CLOSED = shutil.which("bwrap") or has_landlock()
 
 
 def cell_of(notebook, grade_id):
-    return next(c for c in notebook["cells"] if c["metadata"].get("nbgrader", {}).get("grade_id") == grade_id)
+    return next(
+        c
+        for c in notebook["cells"]
+        if c["metadata"].get("nbgrader", {}).get("grade_id") == grade_id
+    )
 
 
 def answered(source):
@@ -169,7 +174,11 @@ def grades(out):
         done = json.loads(path.read_text())
         first, *others = done["exercises"]
         said = {o["message"] for o in first["outcomes"]} | set(done["notes"])
-        found[done["submission"]] = first["points"], sum(e["points"] for e in others), " ".join(sorted(said))
+        found[done["submission"]] = (
+            first["points"],
+            sum(e["points"] for e in others),
+            " ".join(sorted(said)),
+        )
     return found
 
 
@@ -210,7 +219,8 @@ def test_importing_the_answer_gets_a_hint_that_says_so(class_of_cheats):
         assert "your own lines" in class_of_cheats[name][2]
 
 
-# Notebooks that are not what they should be ------------------------------------------------------------
+# Notebooks that are not what they should be
+# ------------------------------------------------------------
 
 
 def without(grade_id):
@@ -250,7 +260,9 @@ def other_kernel():
 def strange_metadata():
     notebook = copy.deepcopy(SOLVED)
     notebook["cells"][1]["metadata"] = {"nbgrader": [1, 2, 3]}
-    notebook["cells"].append({"cell_type": "code", "metadata": {}, "source": ["%timeit 1\n", "!ls\n"]})
+    notebook["cells"].append(
+        {"cell_type": "code", "metadata": {}, "source": ["%timeit 1\n", "!ls\n"]}
+    )
     return notebook
 
 
@@ -373,9 +385,16 @@ def test_junit_and_gradescope_hold_the_same_points(class_of_odd_files):
     _, out = class_of_odd_files
     suites = ElementTree.parse(out / "junit.xml").getroot()
     failed = {s.get("name"): int(s.get("failures")) for s in suites}
-    assert failed["another kernel"] == 0 and failed["a cell deleted"] == 1 and failed["invalid JSON"] == 5
+    assert (
+        failed["another kernel"] == 0
+        and failed["a cell deleted"] == 1
+        and failed["invalid JSON"] == 5
+    )
     tests = json.loads((out / safe("a cell deleted") / "results.json").read_text())["tests"]
-    assert [(t["name"][:3], t["score"]) for t in tests][:2] == [("6.1", 0), ("6.2", find("6.2").points)]
+    assert [(t["name"][:3], t["score"]) for t in tests][:2] == [
+        ("6.1", 0),
+        ("6.2", find("6.2").points),
+    ]
     assert sum(t["max_score"] for t in tests) == FULL
 
 
@@ -385,7 +404,8 @@ def test_a_page_says_what_was_wrong_and_runs_nothing(class_of_odd_files):
     assert "<script>" not in page and "&lt;script&gt;" in page
 
 
-# The grader itself -------------------------------------------------------------------------------------
+# The grader itself
+# -------------------------------------------------------------------------------------
 
 
 def test_two_gradings_are_equal_to_the_byte(tmp_path):
@@ -456,7 +476,9 @@ def test_what_breaks_the_grader_costs_one_submission_and_is_told(tmp_path, monke
     assert "ann: NOT GRADED" in capsys.readouterr().err
     assert set(grades(tmp_path / "out")) == {"bob"}
     rows = list(csv.reader((tmp_path / "out" / "class.csv").open()))
-    assert [row[0] for row in rows] == ["submission", "ann", "bob"] and "a bug of ours" in rows[1][-1]
+    assert [row[0] for row in rows] == ["submission", "ann", "bob"] and "a bug of ours" in rows[1][
+        -1
+    ]
 
 
 @pytest.mark.parametrize(
@@ -479,7 +501,8 @@ def test_a_flat_folder_is_a_class_unless_its_names_are_those_of_the_course(tmp_p
     (tmp_path / "one").mkdir()
     for path in ("flat/ann.ipynb", "flat/bob.ipynb", "one/06_reward.ipynb"):
         (tmp_path / path).write_text(json.dumps(unmarked()))
-    out = tmp_path / "flat" / "grades"  # inside the class: it is no submission, neither then nor later
+    # inside the class: it is no submission, neither then nor later
+    out = tmp_path / "flat" / "grades"
     for folder in ("flat", "flat", "one"):
         assert main([str(tmp_path / folder), "--out", str(out), "--notebooks", " 06"]) == 0
     assert {name: sum(g[:2]) for name, g in grades(out).items()} == {
@@ -489,7 +512,11 @@ def test_a_flat_folder_is_a_class_unless_its_names_are_those_of_the_course(tmp_p
 
 def test_one_students_marks_and_a_loose_notebook_do_not_stop_the_class(tmp_path):
     strange = copy.deepcopy(SOLVED)
-    for grade_id, source in (("ex-99-1", "x = 1"), (["ex-6-1"], "y = 1"), ("z", "# Exercise 77.3\nz = 1")):
+    for grade_id, source in (
+        ("ex-99-1", "x = 1"),
+        (["ex-6-1"], "y = 1"),
+        ("z", "# Exercise 77.3\nz = 1"),
+    ):
         note = {"nbgrader": {"grade_id": grade_id}}
         strange["cells"].append({"cell_type": "code", "metadata": note, "source": source})
     write(tmp_path / "class", "ann", strange)
@@ -542,7 +569,9 @@ def test_an_answer_that_counts_its_calls_and_remembers_what_it_said_earns_nothin
 
 def test_one_open_case_costs_its_own_checks_only():
     exercise = find("10.4")
-    source = exercise.source.replace("    if not expert.all():", f"    {STUB}\n    if not expert.all():")
+    source = exercise.source.replace(
+        "    if not expert.all():", f"    {STUB}\n    if not expert.all():"
+    )
     with Sandbox() as box:
         result = grading.grade_one(exercise, Answer(source, [], ""), box)
     assert 0 < result.points < result.most and not result.open
@@ -558,11 +587,20 @@ def test_without_either_wall_the_warning_says_that_files_can_be_read(monkeypatch
 def test_without_bubblewrap_there_is_a_warning_and_the_limits_stay(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("shutil.which", lambda name: None)
     monkeypatch.setattr(sandbox, "WALL", 4)
-    names = ["sleep", "fork bomb, quiet", "a full disk", "opens a socket", "imports the answer", "100 GB"]
+    names = [
+        "sleep",
+        "fork bomb, quiet",
+        "a full disk",
+        "opens a socket",
+        "imports the answer",
+        "100 GB",
+    ]
     names += READERS if has_landlock() else []
     for name in names:
         source = BAD[name][0].replace("CLASS", repr(str(tmp_path / "class")))
         write(tmp_path / "class", name, answered(source))
     assert main([str(tmp_path / "class"), "--out", str(tmp_path / "out"), "--notebooks", "6"]) == 0
     assert "bubblewrap is not installed" in capsys.readouterr().err
-    assert {n: g[:2] for n, g in grades(tmp_path / "out").items()} == {n: (BAD[n][1], REST) for n in names}
+    assert {n: g[:2] for n, g in grades(tmp_path / "out").items()} == {
+        n: (BAD[n][1], REST) for n in names
+    }

@@ -20,17 +20,29 @@ def imported(path):
 
 @pytest.mark.parametrize("path", PACKAGE, ids=lambda p: p.name)
 def test_the_method_imports_no_simulator(path):
-    assert not {"pybullet", "pybullet_data", "pybullet_utils", "tasks", "meshcat"} & set(imported(path))
+    assert not {"pybullet", "pybullet_data", "pybullet_utils", "tasks", "meshcat"} & set(
+        imported(path)
+    )
 
 
 @pytest.mark.parametrize("path", PACKAGE, ids=lambda p: p.name)
 def test_the_method_names_nothing_of_the_simulators_state(path):
-    """Success may be logged, by `info["is_success"]`; positions, poses and joints may not be touched."""
-    words = ("true_pixels", "object_position", "target_position", "tip_pose", "unwrapped", "waypoints")
+    """Success may be logged, by `info["is_success"]`; positions, poses and joints may not be
+    touched."""
+    words = (
+        "true_pixels",
+        "object_position",
+        "target_position",
+        "tip_pose",
+        "unwrapped",
+        "waypoints",
+    )
     assert not [w for w in words if w in path.read_text()]
 
 
-@pytest.mark.parametrize("path", [*PACKAGE, *sorted((ROOT / "tasks").glob("*.py"))], ids=lambda p: p.name)
+@pytest.mark.parametrize(
+    "path", [*PACKAGE, *sorted((ROOT / "tasks").glob("*.py"))], ids=lambda p: p.name
+)
 def test_nothing_is_unpickled(path):
     text = path.read_text()
     assert not [w for w in ("import pickle", "torch.load(", "allow_pickle=True") if w in text]

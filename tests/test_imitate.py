@@ -4,7 +4,9 @@ import numpy as np
 
 from lbw_minimal.imitate import Recipe, Run, learn_perception, load_perception
 
-TINY = Recipe(human_frames=6, robot_frames=6, munit_iterations=1, munit_width=4, transporter_iterations=1)
+TINY = Recipe(
+    human_frames=6, robot_frames=6, munit_iterations=1, munit_width=4, transporter_iterations=1
+)
 
 
 def frames(n):
@@ -13,7 +15,9 @@ def frames(n):
 
 def test_one_video_alone_may_be_the_whole_human_domain(tmp_path):
     nothing = frames(6)[:0]
-    P = learn_perception(frames(6), nothing, frames(7), TINY, task="push", seed=0, run=Run(tmp_path))
+    P = learn_perception(
+        frames(6), nothing, frames(7), TINY, task="push", seed=0, run=Run(tmp_path)
+    )
     P.watch(frames(6))
     assert P.translated.shape == (6, 84, 84, 3) and P.z_E.shape == (6, TINY.K, 2)
 

@@ -11,8 +11,8 @@ from lbw_minimal.training import Checkpoint, InputError, save_state
 
 
 class Stub:
-    """Networks of numbers: an image v has content 10 v and style v in "x", 10 v + 1 and v + 2 in "y"; images
-    are decoded to c + s in "x" and to c + 2 s in "y"."""
+    """Networks of numbers: an image v has content 10 v and style v in "x", 10 v + 1 and v + 2 in
+    "y"; images are decoded to c + s in "x" and to c + 2 s in "y"."""
 
     def content(self, image, domain):
         return 10 * image + (domain == "y")
@@ -33,7 +33,8 @@ def image(value):
 
 @pytest.fixture(scope="module")
 def by_hand():
-    """x = 1 and y = 2, so c_x = 10, c_y = 21, s_x = 1, s_y = 4, G_X(c_y, s_x) = 22, G_Y(c_x, s_y) = 18."""
+    """x = 1 and y = 2, so c_x = 10, c_y = 21, s_x = 1, s_y = 4, G_X(c_y, s_x) = 22, G_Y(c_x, s_y) =
+    18."""
     x, y = image(1), image(2)
     losses = generator_losses(Stub(), CRITICS, x, y, swap(Stub(), x, y))
     return {name: loss.item() for name, loss in losses.items()}
@@ -64,7 +65,8 @@ def test_loss_equals_the_sum_done_by_hand(by_hand, name, value):
 
 
 def test_style_loss_compares_styles_of_the_same_domain(by_hand):
-    # The known bug takes E_X^s of the Y translation: |E_X^s(18) - s_x| = 17, |E_Y^s(22) - s_y| = 20.
+    # The known bug takes E_X^s of the Y translation: |E_X^s(18) - s_x| = 17, |E_Y^s(22) - s_y| =
+    # 20.
     assert (by_hand["L_rec^s_x"], by_hand["L_rec^s_y"]) == (21, 16)
 
 
@@ -93,12 +95,15 @@ def test_critics_step_sends_no_gradient_to_the_generator():
 def test_motion_weight_is_one_on_the_median_frame_and_grows_with_the_distance():
     median, frame = torch.zeros(1, 3, 2, 2), torch.zeros(1, 3, 2, 2)
     frame[0, :, 0, 1] = torch.tensor([0.2, -0.4, 0.6])  # mean distance 0.4
-    assert torch.allclose(munit.motion_weight(frame, median, 5.0), torch.tensor([[[[1.0, 3.0], [1.0, 1.0]]]]))
+    assert torch.allclose(
+        munit.motion_weight(frame, median, 5.0), torch.tensor([[[[1.0, 3.0], [1.0, 1.0]]]])
+    )
 
 
 def test_motion_weighs_image_and_cycle_losses_pixel_by_pixel():
     x, y = image(1), image(2)
-    median = torch.tensor([1.0, 1.0, 1.0, 0.0]).view(1, 1, 2, 2)  # the weights' mean is 1 + MOTION_L1 / 4
+    # the weights' mean is 1 + MOTION_L1 / 4
+    median = torch.tensor([1.0, 1.0, 1.0, 0.0]).view(1, 1, 2, 2)
     plain = generator_losses(Stub(), CRITICS, x, y, swap(Stub(), x, y))
     heavy = generator_losses(Stub(), CRITICS, x, y, swap(Stub(), x, y), median_x=median)
     assert heavy["L_rec^x"] == (1 + munit.MOTION_L1 / 4) * plain["L_rec^x"]
@@ -109,8 +114,11 @@ def test_motion_weighs_image_and_cycle_losses_pixel_by_pixel():
 def test_motion_makes_critics_judge_the_arm_not_the_wall():
     median, made = image(0), image(0)
     made[..., 1, 1] = 1.0  # moved there: weight 1 + MOTION_GAN, elsewhere 1
-    critics = {d: lambda v: [v] for d in "xy"}  # errors against 0 for translated: 1 there, 0 elsewhere
-    L = discriminator_losses(critics, image(1), image(1), (None,) * 4 + (made, made), median_x=median)
+    # errors against 0 for translated: 1 there, 0 elsewhere
+    critics = {d: lambda v: [v] for d in "xy"}
+    L = discriminator_losses(
+        critics, image(1), image(1), (None,) * 4 + (made, made), median_x=median
+    )
     share = (1 + munit.MOTION_GAN) / (4 + munit.MOTION_GAN)
     assert L["L_D^x"].item() == pytest.approx(share) and L["L_D^y"].item() == pytest.approx(1 / 4)
 
@@ -133,7 +141,10 @@ def test_content_encoder_is_one_network_when_shared_and_two_when_not():
 
 
 def test_translation_of_a_frame_does_not_depend_on_the_frames_beside_it():
-    model, frames = MUNIT(2).eval(), np.random.default_rng(0).integers(0, 256, (40, 84, 84, 3), np.uint8)
+    model, frames = (
+        MUNIT(2).eval(),
+        np.random.default_rng(0).integers(0, 256, (40, 84, 84, 3), np.uint8),
+    )
     s_y = munit.robot_style(model, frames)
     video = munit.translate(model, frames, s_y)
     assert video.shape == frames.shape and video.dtype == np.uint8 and s_y.shape == (8,)
@@ -155,7 +166,10 @@ def test_frames_survive_the_way_to_images_and_back():
 
 
 def test_file_carries_sizes_weights_and_style(tmp_path):
-    model, style = MUNIT(2, style_dim=3, blocks=1, shared_content=False), torch.tensor([1.0, 2.0, 3.0])
+    model, style = (
+        MUNIT(2, style_dim=3, blocks=1, shared_content=False),
+        torch.tensor([1.0, 2.0, 3.0]),
+    )
     munit.save(tmp_path / "munit.safetensors", model, style, "push")
     loaded, loaded_style = munit.load(tmp_path / "munit.safetensors", "push")
     assert loaded.sizes == model.sizes and torch.equal(loaded_style, style)
@@ -165,7 +179,9 @@ def test_file_carries_sizes_weights_and_style(tmp_path):
 
 def test_weights_of_another_task_are_refused(tmp_path):
     munit.save(tmp_path / "munit.safetensors", MUNIT(2), torch.zeros(8), "reach")
-    with pytest.raises(InputError, match=r"munit\.safetensors: weights of the task reach, not of push"):
+    with pytest.raises(
+        InputError, match=r"munit\.safetensors: weights of the task reach, not of push"
+    ):
         munit.load(tmp_path / "munit.safetensors", "push")
 
 
@@ -210,7 +226,9 @@ def test_training_killed_and_resumed_ends_as_if_never_killed(videos, tmp_path, m
     with pytest.raises(Killed):
         munit.train(*videos, **small, checkpoint=DiesAfter(tmp_path / "munit", 3))
     resumed, resumed_log = munit.train(*videos, **small, checkpoint=Checkpoint(tmp_path / "munit"))
-    assert all(torch.equal(a, b) for a, b in zip(whole.parameters(), resumed.parameters(), strict=True))
+    assert all(
+        torch.equal(a, b) for a, b in zip(whole.parameters(), resumed.parameters(), strict=True)
+    )
     assert whole_log == resumed_log and [row["step"] for row in resumed_log] == [2, 4]
 
 

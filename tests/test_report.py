@@ -68,7 +68,8 @@ def titles(page):
 
 
 def test_wilson_gives_the_published_values():
-    """10 of 10 and 5 of 10 by hand: n / (n + z^2), and 1/2 -+ z / (2 sqrt(n + z^2)), z^2 = 3.8415."""
+    """10 of 10 and 5 of 10 by hand: n / (n + z^2), and 1/2 -+ z / (2 sqrt(n + z^2)), z^2 =
+    3.8415."""
     np.testing.assert_allclose(report.wilson(10, 10), (10 / 13.8415, 1), atol=1e-5)
     np.testing.assert_allclose(report.wilson(5, 10), (0.236593, 0.763407), atol=1e-5)
 
@@ -85,7 +86,8 @@ def test_wilson_refuses_impossible_counts(wins, n):
 
 
 def test_a_keypoint_is_drawn_on_the_pixel_it_names():
-    """z = (-1 + 2 (20.5) / 84, ...) is the centre of pixel 20: columns 80 to 83 of the enlarged frame."""
+    """z = (-1 + 2 (20.5) / 84, ...) is the centre of pixel 20: columns 80 to 83 of the enlarged
+    frame."""
     z = np.array([[[2 * 20.5 / 84 - 1, 2 * 60.5 / 84 - 1]]])
     image = report.draw_keypoints(np.zeros((1, 84, 84, 3), np.uint8), z, scale=3)[0]
     rows, columns = np.nonzero(image.any(-1))
@@ -171,7 +173,9 @@ def test_the_page_loads_nothing_from_elsewhere(page):
 
 
 def test_the_page_names_no_path_of_the_machine(page, folder):
-    decoded = [base64.b64decode(d).decode(errors="ignore") for d in re.findall(r"base64,([^\"]*)", page)]
+    decoded = [
+        base64.b64decode(d).decode(errors="ignore") for d in re.findall(r"base64,([^\"]*)", page)
+    ]
     assert not [text for text in (page, *decoded) if str(folder) in text or "/lib/python" in text]
 
 
@@ -229,7 +233,11 @@ def test_a_smoke_run_says_so(tmp_path, page, run):
 
 
 def test_text_of_the_run_cannot_break_the_page(tmp_path, run):
-    run |= {"task": "<script>x", "command": "a & b < c", "metrics": {"settings": {"video": '"><script>y'}}}
+    run |= {
+        "task": "<script>x",
+        "command": "a & b < c",
+        "metrics": {"settings": {"video": '"><script>y'}},
+    }
     page = written(tmp_path, run)
     assert "<script>x" not in page and "<script>y" not in page and "a &amp; b &lt; c" in page
 

@@ -37,7 +37,8 @@ def flat(tree, name=""):
 
 @pytest.mark.slow
 def test_fifteen_kills_change_nothing(tmp_path):
-    """Five SIGKILLs at random moments of each stage; the weights equal those of an undisturbed run."""
+    """Five SIGKILLs at random moments of each stage; the weights equal those of an undisturbed
+    run."""
     whole, killed = tmp_path / "whole", tmp_path / "killed"
     assert start(whole).wait() == 0
     dice, options = random.Random(0), ()
@@ -55,7 +56,9 @@ def test_fifteen_kills_change_nothing(tmp_path):
     assert start(killed, "--resume").wait() == 0
     assert (killed / "report.html").exists()
     for stage in STAGES:
-        a, b = (dict(flat(load_state(folder / f"{stage}.safetensors"))) for folder in (whole, killed))
+        a, b = (
+            dict(flat(load_state(folder / f"{stage}.safetensors"))) for folder in (whole, killed)
+        )
         assert a.keys() == b.keys()
         for name in a:
             np.testing.assert_array_equal(a[name], b[name], err_msg=f"{stage}{name}")

@@ -1,4 +1,5 @@
-"""What Eq. 8-10 pay, computed by hand, and what the mended form pays for on a toy of the push task."""
+"""What Eq. 8-10 pay, computed by hand, and what the mended form pays for on a toy of the push
+task."""
 
 from itertools import pairwise
 
@@ -24,7 +25,9 @@ def line(*x):
 
 
 def random_walk(K, n=400, step=0.1, seed=0):
-    return np.cumsum(np.random.default_rng(seed).normal(size=(n, K, 2)) * step / (2 * K) ** 0.5, axis=0)
+    return np.cumsum(
+        np.random.default_rng(seed).normal(size=(n, K, 2)) * step / (2 * K) ** 0.5, axis=0
+    )
 
 
 def total(reward, z):
@@ -53,7 +56,9 @@ def acted(*waypoints):
 
 def replay(toy):
     """The demonstration acted out at its own pace, without the pauses."""
-    return acted((-0.3, 0.3, 0.35, 0), (-0.26, 0.5, 0.35, 0), (0.55 - HALF_PUCK - HALF_GRIPPER, 0.5, 0.5, 0))
+    return acted(
+        (-0.3, 0.3, 0.35, 0), (-0.26, 0.5, 0.35, 0), (0.55 - HALF_PUCK - HALF_GRIPPER, 0.5, 0.5, 0)
+    )
 
 
 # The paper's form ---------------------------------------------------------------------------------
@@ -66,7 +71,8 @@ def test_eq_9_is_the_distance_to_the_nearest_frame_and_looks_at_z_t():
 
 def test_eq_9_leaves_the_goal_frame_out():
     reward = KeypointReward(line(0, 1, 3), form="literal")
-    assert reward(line(3)[0], line(3)[0])[1]["r1"] == pytest.approx(-2)  # p <= N - 1: nearest is x = 1
+    # p <= N - 1: nearest is x = 1
+    assert reward(line(3)[0], line(3)[0])[1]["r1"] == pytest.approx(-2)
 
 
 def test_eq_10_is_the_distance_to_the_nearest_step_wherever_it_was_made():
@@ -87,7 +93,8 @@ def test_eq_8_weighs_the_parts_by_lambda():
 
 
 def test_idle_agent_wins_under_the_literal_reward(toy):
-    """The trap: the demonstration starts at the robot's pose and pauses, so standing still is perfect."""
+    """The trap: the demonstration starts at the robot's pose and pauses, so standing still is
+    perfect."""
     literal = KeypointReward(toy[0], form="literal")
     idle = np.repeat(toy[0][:1], HORIZON + 1, axis=0)
     assert total(literal, idle) == 0 >= total(literal, episode(toy[0]))
@@ -102,8 +109,8 @@ def test_idle_agent_scores_far_below_the_replayed_demonstration(toy):
 
 
 def test_arm_that_never_touches_the_object_scores_below_the_replay(toy):
-    """The arm goes where it should but its puck stays: from the demonstration's end on, each step costs the
-    puck's share of the path."""
+    """The arm goes where it should but its puck stays: from the demonstration's end on, each step
+    costs the puck's share of the path."""
     reward, touchless = mended(toy), replay(toy).copy()
     touchless[:, 3] = touchless[0, 3]
     share = np.linalg.norm(reward.z_E[-1, 3] - reward.z_E[0, 3]) / 4 / reward.path
@@ -132,7 +139,9 @@ def test_idle_agent_seen_at_the_end_is_the_unit_of_r1():
 def test_reward_is_bounded_whatever_the_keypoints_do(toy):
     wild = np.random.default_rng(0).uniform(-1e6, 1e6, (200, 4, 2))
     reward = mended(toy)
-    assert all(-2 * sum(LAMBDA) <= reward(a, b, t)[0] <= 0 for t, (a, b) in enumerate(pairwise(wild)))
+    assert all(
+        -2 * sum(LAMBDA) <= reward(a, b, t)[0] <= 0 for t, (a, b) in enumerate(pairwise(wild))
+    )
 
 
 def test_one_lost_keypoint_costs_no_more_than_its_share(toy):
@@ -156,7 +165,9 @@ def test_staying_behind_costs_only_if_the_reward_is_timed(toy):
 
 def test_without_the_goal_frame_the_frame_before_it_is_the_target(toy):
     with_goal, without = mended(toy), mended(toy, include_goal=False)
-    assert (with_goal.target(99) == with_goal.z_E[-1]).all() and (without.target(99) == without.z_E[-2]).all()
+    assert (with_goal.target(99) == with_goal.z_E[-1]).all() and (
+        without.target(99) == without.z_E[-2]
+    ).all()
 
 
 @pytest.mark.parametrize("mend", MENDS)

@@ -56,7 +56,9 @@ def test_log_density_of_a_squashed_action_is_that_of_torch():
     a, log_pi = actor.sample(s)
     mean, log_std = actor(s)
     normal = torch.distributions.Normal(mean, log_std.exp())
-    squashed = torch.distributions.TransformedDistribution(normal, torch.distributions.TanhTransform())
+    squashed = torch.distributions.TransformedDistribution(
+        normal, torch.distributions.TanhTransform()
+    )
     assert torch.allclose(log_pi, squashed.log_prob(a).sum(-1), atol=1e-3)
 
 
@@ -75,7 +77,9 @@ def test_the_two_critics_are_two_plain_networks():
         x = torch.cat([s, a], 1)
         for j in range(2):
             x = x @ critic.weights[j][i] + critic.biases[j][i]
-            x = ((x - x.mean(1, keepdim=True)) / (x.var(1, correction=0, keepdim=True) + 1e-5).sqrt()).relu()
+            x = (
+                (x - x.mean(1, keepdim=True)) / (x.var(1, correction=0, keepdim=True) + 1e-5).sqrt()
+            ).relu()
         q = x @ critic.weights[2][i] + critic.biases[2][i]
         assert torch.allclose(critic(s, a)[i], q[:, 0], atol=1e-5)
 
@@ -156,12 +160,17 @@ def test_the_target_critics_follow_by_tau():
     sac = small(tau=0.25)
     old = [p.clone() for p in sac.target.parameters()]
     sac.update(batch_of())
-    for before, target, critic in zip(old, sac.target.parameters(), sac.critic.parameters(), strict=True):
+    for before, target, critic in zip(
+        old, sac.target.parameters(), sac.critic.parameters(), strict=True
+    ):
         assert torch.allclose(target, 0.75 * before + 0.25 * critic, atol=1e-6)
 
 
 def test_running_normalisation_is_that_of_all_observations():
-    sac, x = small(), np.random.default_rng(0).normal([1, -2, 5], [1, 3, 0.5], (500, 3)).astype(np.float32)
+    sac, x = (
+        small(),
+        np.random.default_rng(0).normal([1, -2, 5], [1, 3, 0.5], (500, 3)).astype(np.float32),
+    )
     for row in x:
         sac.observe(row)
     assert sac.obs_mean.numpy() == pytest.approx(x.mean(0), abs=1e-3)
@@ -173,7 +182,9 @@ def test_running_normalisation_is_that_of_all_observations():
 
 def test_the_time_limit_is_not_stored_as_the_end(monkeypatch):
     buffers = []
-    monkeypatch.setattr(module, "ReplayBuffer", lambda *a: buffers.append(ReplayBuffer(*a)) or buffers[-1])
+    monkeypatch.setattr(
+        module, "ReplayBuffer", lambda *a: buffers.append(ReplayBuffer(*a)) or buffers[-1]
+    )
     train(Walk(), steps=60, seed=0, random_steps=100, width=8)
     assert len(buffers[0]) == 60 and (buffers[0].data["terminal"] == 0).all()
 
@@ -229,9 +240,17 @@ def test_the_log_has_reward_parts_losses_and_evaluations():
     seen = []
     _, log = train(Walk(), steps=80, seed=0, random_steps=20, width=8, batch=8,
                    evaluate=lambda sac: seen.append(sac) or {"test": 1.0}, evaluate_every=2)  # fmt: skip
-    assert {"episode", "step", "return", "r1", "r2", "success", "alpha", "entropy", "critic_loss"} < set(
-        log[-1]
-    )
+    assert {
+        "episode",
+        "step",
+        "return",
+        "r1",
+        "r2",
+        "success",
+        "alpha",
+        "entropy",
+        "critic_loss",
+    } < set(log[-1])
     assert [("test" in row) for row in log] == [False, True, False, True] and len(seen) == 2
 
 
@@ -257,7 +276,8 @@ def test_the_actor_that_earns_most_without_noise_is_chosen():
 
 
 def test_actors_of_the_best_windows_and_of_the_end_compete(monkeypatch):
-    """Returns of 40 episodes rise and fall: of four windows of ten, two are kept, and the end joins."""
+    """Returns of 40 episodes rise and fall: of four windows of ten, two are kept, and the end
+    joins."""
     seen = []
 
     class Tide(Walk):

@@ -1,4 +1,5 @@
-"""All scenes, both arms: the mirror in the browser stands where PyBullet has it, and the picture is whole."""
+"""All scenes, both arms: the mirror in the browser stands where PyBullet has it, and the picture is
+whole."""
 
 import numpy as np
 import pytest
@@ -16,9 +17,12 @@ def make(name, arm):
 
 
 def poses(page):
-    """What the page tells the browser of its links: {path: 4x4} and, of those that move, {path: (T, 7)}."""
+    """What the page tells the browser of its links: {path: 4x4} and, of those that move, {path: (T,
+    7)}."""
     told = commands(page)
-    still = {c["path"]: np.reshape(c["matrix"], (4, 4)).T for c in told if c["type"] == "set_transform"}
+    still = {
+        c["path"]: np.reshape(c["matrix"], (4, 4)).T for c in told if c["type"] == "set_transform"
+    }
     moving = {}
     for part in (part for c in told for part in c.get("animations", [])):
         tracks = {t["name"]: [k["value"] for k in t["keys"]] for t in part["clip"]["tracks"]}
@@ -65,7 +69,8 @@ def frame(p, body, link):
 
 @pytest.mark.parametrize(("name", "arm"), SCENES)
 def test_painting_the_scenery_once_changes_no_pixel(name, arm, monkeypatch):
-    """The same episode rendered with everything in the scene: the depth keeps what is in front in front."""
+    """The same episode rendered with everything in the scene: the depth keeps what is in front in
+    front."""
     fast = make(name, arm)
     monkeypatch.setattr(World, "paint", lambda world: None)
     full = make(name, arm)

@@ -43,7 +43,10 @@ def runs(tmp_path, monkeypatch):
 def test_row_has_the_rate_of_all_seeds_and_its_interval(runs):
     text = table.table(runs, jobs=1)
     # 29 of 30: Wilson 83.3 to 99.4 %; 24 of 30: 62.7 to 90.5 %; 0 of 30: 0 to 11.4 %
-    assert "| push | 100 % | 97 % (83-99) | 10/10, 10/10, 9/10 | 0 % (0-11) | 0/10, 0/10, 0/10 |" in text
+    assert (
+        "| push | 100 % | 97 % (83-99) | 10/10, 10/10, 9/10 | 0 % (0-11) | 0/10, 0/10, 0/10 |"
+        in text
+    )
     assert "| slide | 80 % | 80 % (63-90) | 8/10, 7/10, 9/10 |" in text
     assert "| 6 min | 10,000 |" in text
     assert "| push | 0 | 0.990 / 0.990 / 0.990 / - | 0.990 / 0.990 / 0.990 / - |" in text

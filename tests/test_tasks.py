@@ -67,7 +67,8 @@ def test_a_puck_kicked_at_1_m_s_slides_as_coulomb_says():
     p.resetBaseVelocity(env.puck, (1, 0, 0))
     for _ in range(60):
         env.step(np.zeros(3))
-    assert env.object_position()[0] - 0.75 == pytest.approx(1 / (2 * 0.1 * 9.81), rel=0.01)  # 0.510 m
+    # 0.510 m
+    assert env.object_position()[0] - 0.75 == pytest.approx(1 / (2 * 0.1 * 9.81), rel=0.01)
     env.close()
 
 
@@ -176,7 +177,10 @@ def test_the_same_seed_gives_the_same_frames_in_two_processes():
         "frames, _ = tasks.world.record_random(env, 60, seed=5); "
         "print(hashlib.sha256(frames.tobytes()).hexdigest())"
     )
-    out = [subprocess.run([sys.executable, "-c", code], capture_output=True, text=True) for _ in range(2)]
+    out = [
+        subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+        for _ in range(2)
+    ]
     assert len(out[0].stdout) == 65, "one line, and nothing from PyBullet"
     assert out[0].stdout == out[1].stdout
 

@@ -9,7 +9,14 @@ import pytest
 import torch
 
 from lbw_minimal import training
-from lbw_minimal.training import Checkpoint, InputError, load_state, pick_device, save_state, seed_everything
+from lbw_minimal.training import (
+    Checkpoint,
+    InputError,
+    load_state,
+    pick_device,
+    save_state,
+    seed_everything,
+)
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -232,7 +239,9 @@ def test_cuda_is_refused_where_there_is_none(monkeypatch, name):
 
 
 def test_unknown_device_is_refused():
-    with pytest.raises(InputError, match="--device toaster: torch knows no such device; use cpu or cuda"):
+    with pytest.raises(
+        InputError, match="--device toaster: torch knows no such device; use cpu or cuda"
+    ):
         pick_device("toaster")
 
 

@@ -11,13 +11,15 @@ TRAINING = 60  # iterations of the one training that several claims share, a sec
 
 
 def squares(T=240, seed=0):
-    """A red and a blue square, 14 pixels wide, on separate smooth paths; true centres (T, 2, 2) in pixels."""
+    """A red and a blue square, 14 pixels wide, on separate smooth paths; true centres (T, 2, 2) in
+    pixels."""
     rng = np.random.default_rng(seed)
     phase, t = rng.uniform(0, 2 * np.pi, 4), np.arange(T)
     # Frequencies without a common divisor: nothing about one square can be read off the other.
     x_red, y_red = 42 + 26 * np.sin(0.131 * t + phase[0]), 22 + 10 * np.sin(0.171 * t + phase[1])
     x_blue, y_blue = 42 + 26 * np.sin(0.113 * t + phase[2]), 60 + 10 * np.sin(0.097 * t + phase[3])
-    centres = np.stack([np.stack([x_red, y_red], 1), np.stack([x_blue, y_blue], 1)], 1).round()  # (T, 2, 2)
+    # (T, 2, 2)
+    centres = np.stack([np.stack([x_red, y_red], 1), np.stack([x_blue, y_blue], 1)], 1).round()
     frames = np.full((T, 84, 84, 3), 120, np.uint8)
     for frame, pair in zip(frames, centres.astype(int), strict=True):
         for (x, y), colour in zip(pair, [(200, 40, 40), (40, 60, 200)], strict=True):
@@ -35,7 +37,9 @@ def trained():
 
 def follow(z, centres):
     """R^2 (K, squares) of each keypoint's own linear map to each square, the worse of x and y."""
-    return np.array([[tp.r2(z[:, [k]], centres[:, s]).min() for s in (0, 1)] for k in range(z.shape[1])])
+    return np.array(
+        [[tp.r2(z[:, [k]], centres[:, s]).min() for s in (0, 1)] for k in range(z.shape[1])]
+    )
 
 
 def test_transport_is_equation_6_by_hand():
@@ -96,14 +100,17 @@ def test_x_and_y_of_a_keypoint_come_from_the_same_thing():
     logits[0, 0, 3:12, 4] = 9.0  # a tall thing on the left has the larger marginal in x
     logits[0, 0, 17, 15] = 14.0
     x, y = tp.soft_argmax(logits)[0, 0]
-    assert (x.item(), y.item()) == pytest.approx(((2 * 15 + 1) / 21 - 1, (2 * 17 + 1) / 21 - 1), abs=0.01)
+    assert (x.item(), y.item()) == pytest.approx(
+        ((2 * 15 + 1) / 21 - 1, (2 * 17 + 1) / 21 - 1), abs=0.01
+    )
 
 
 def test_identity_is_the_variance_of_the_colour_under_a_keypoint():
     y = torch.zeros(2, 3, 84, 84)
     y[:, 0, :, 42:] = 1.0  # the right half is red
     z = torch.tensor([[[-0.7, 0.0], [0.7, 0.3]], [[0.7, 0.0], [0.7, -0.3]]])
-    # The first changes from 0 to 1 in one channel, variance 1/2; the second stays red. Their mean is 1/4.
+    # The first changes from 0 to 1 in one channel, variance 1/2; the second stays red. Their mean
+    # is 1/4.
     assert tp.identity(z, y).item() == pytest.approx(0.25, abs=1e-4)
 
 
@@ -157,7 +164,9 @@ def test_detection_holds_on_noisy_darker_frames(trained):
     model, _, z, frames, centres = trained
     noise = np.random.default_rng(0).normal(0, 6, frames.shape)
     worse = (frames * 0.9 + noise).clip(0, 255).astype(np.uint8)
-    assert (tp.r2(z, centres.reshape(-1, 4), tp.detect(model, worse), centres.reshape(-1, 4)) > 0.8).all()
+    assert (
+        tp.r2(z, centres.reshape(-1, 4), tp.detect(model, worse), centres.reshape(-1, 4)) > 0.8
+    ).all()
 
 
 def test_detecting_one_frame_or_many_gives_the_same(trained):
@@ -168,7 +177,9 @@ def test_detecting_one_frame_or_many_gives_the_same(trained):
 
 def test_same_seed_same_model_and_another_seed_another():
     frames, _ = squares(40)
-    a, b, c = (tp.detect(tp.train([frames], iterations=3, seed=s, K=2)[0], frames[:2]) for s in (0, 0, 1))
+    a, b, c = (
+        tp.detect(tp.train([frames], iterations=3, seed=s, K=2)[0], frames[:2]) for s in (0, 0, 1)
+    )
     assert np.array_equal(a, b) and not np.array_equal(a, c)
 
 
@@ -209,7 +220,8 @@ def test_r2_is_1_for_a_linear_map_with_intercept():
 def test_r2_by_hand_on_a_held_out_set():
     z, true = np.array([[[0.0]], [[1.0]]]), np.array([[0.0], [1.0]])  # the map is the identity
     z_held, true_held = np.array([[[0.0]], [[2.0]]]), np.array([[0.0], [4.0]])
-    # Predicted 0 and 2, true 0 and 4 with mean 2: 1 - 4 / 8; root of the mean square error, (4 / 2)^0.5.
+    # Predicted 0 and 2, true 0 and 4 with mean 2: 1 - 4 / 8; root of the mean square error, (4 /
+    # 2)^0.5.
     assert tp.r2(z, true, z_held, true_held) == pytest.approx([0.5])
     assert tp.pixel_error(z, true, z_held, true_held) == pytest.approx([2**0.5])
 
@@ -222,7 +234,9 @@ def test_r2_of_noise_is_below_0_on_average():
 def test_saved_model_comes_back_with_its_sizes(tmp_path):
     model, images = tp.Transporter(K=3).eval(), torch.rand(2, 3, 84, 84) * 2 - 1
     tp.save(tmp_path / "z.safetensors", model, "push")
-    assert torch.equal(tp.load(tmp_path / "z.safetensors").keypoints(images), model.keypoints(images))
+    assert torch.equal(
+        tp.load(tmp_path / "z.safetensors").keypoints(images), model.keypoints(images)
+    )
 
 
 def test_weights_of_another_task_are_refused(tmp_path):

@@ -1,4 +1,5 @@
-"""Video files: what goes wrong gets one sentence, what goes right keeps its frames, and writing is atomic."""
+"""Video files: what goes wrong gets one sentence, what goes right keeps its frames, and writing is
+atomic."""
 
 import itertools
 import tracemalloc
@@ -26,7 +27,8 @@ def room(size=84, seed=0):
 
 
 def arm_moves(frames):
-    """The same frames with an arm that comes in from the left, a third of the picture wide at the end."""
+    """The same frames with an arm that comes in from the left, a third of the picture wide at the
+    end."""
     frames = np.array(frames)
     n, size = len(frames), frames.shape[1]
     for t in range(n):
@@ -66,7 +68,9 @@ def half_an_avi(path):
 
 
 def empty_mp4(path):
-    cv2.VideoWriter(str(path), cv2.CAP_FFMPEG, cv2.VideoWriter_fourcc(*"mp4v"), 25, (84, 84)).release()
+    cv2.VideoWriter(
+        str(path), cv2.CAP_FFMPEG, cv2.VideoWriter_fourcc(*"mp4v"), 25, (84, 84)
+    ).release()
 
 
 BAD = {
@@ -79,10 +83,22 @@ BAD = {
         half_an_avi,
         r"cut short, its header promises 30 frames and 1\d can be read; copy or",
     ),
-    "zero frames": (empty_mp4, "no frames that OpenCV can decode; record it again or export it as H.264"),
-    "one frame": (lambda path: encode(path, film(1)), "a single frame; give one in which the arm does"),
-    "20x20": (lambda path: encode(path, film(30, 20)), "20x20 pixels are too few; give a video of 84x84 or"),
-    "no motion": (lambda path: encode(path, [room()] * 30), "nothing moves in the video; give one in which"),
+    "zero frames": (
+        empty_mp4,
+        "no frames that OpenCV can decode; record it again or export it as H.264",
+    ),
+    "one frame": (
+        lambda path: encode(path, film(1)),
+        "a single frame; give one in which the arm does",
+    ),
+    "20x20": (
+        lambda path: encode(path, film(30, 20)),
+        "20x20 pixels are too few; give a video of 84x84 or",
+    ),
+    "no motion": (
+        lambda path: encode(path, [room()] * 30),
+        "nothing moves in the video; give one in which",
+    ),
 }
 
 
@@ -99,9 +115,12 @@ def test_bad_file_gets_one_sentence_with_its_name_and_the_remedy(tmp_path, capfd
 
 
 def shaken(frames, pixels):
-    """The inner 84x84 of larger frames, seen by a camera that wanders by that many pixels to each side."""
+    """The inner 84x84 of larger frames, seen by a camera that wanders by that many pixels to each
+    side."""
     margin = (frames.shape[1] - 84) // 2
-    wander = np.rint(margin + pixels * np.sin(np.arange(len(frames))[:, None] * (0.5, 0.4))).astype(int)
+    wander = np.rint(margin + pixels * np.sin(np.arange(len(frames))[:, None] * (0.5, 0.4))).astype(
+        int
+    )
     return np.stack([f[y : y + 84, x : x + 84] for f, (x, y) in zip(frames, wander, strict=True)])
 
 
@@ -120,7 +139,9 @@ def test_shaken_camera_is_warned_of(tmp_path):
 
 def test_panned_camera_is_warned_of(tmp_path):
     wide = film(30, 100)
-    assert warnings_about(tmp_path / "mine.mp4", [f[8:92, t // 3 : t // 3 + 84] for t, f in enumerate(wide)])
+    assert warnings_about(
+        tmp_path / "mine.mp4", [f[8:92, t // 3 : t // 3 + 84] for t, f in enumerate(wide)]
+    )
 
 
 def test_arm_before_a_steady_camera_is_not_warned_of(tmp_path):
@@ -141,7 +162,9 @@ def test_noise_is_not_taken_for_motion(tmp_path):
         video.read(tmp_path / "mine.mp4")
 
 
-@pytest.mark.parametrize("path", sorted(SHIPPED.glob("*/*.mp4")), ids=lambda p: f"{p.parent.name}/{p.stem}")
+@pytest.mark.parametrize(
+    "path", sorted(SHIPPED.glob("*/*.mp4")), ids=lambda p: f"{p.parent.name}/{p.stem}"
+)
 def test_shipped_video_passes_without_a_warning(path):
     frames, warnings = video.read(path)
     assert frames.shape[1:] == (84, 84, 3) and warnings == []
@@ -159,7 +182,8 @@ def test_frames_written_come_back_in_number_rate_and_looks(tmp_path):
     assert back.shape == frames.shape and back.dtype == np.uint8 and warnings == []
     assert cv2.VideoCapture(str(tmp_path / "mine.mp4")).get(cv2.CAP_PROP_FPS) == 12.5
     error = (back.astype(float) - frames) ** 2
-    assert 10 * np.log10(255**2 / error.mean()) > 37  # dB; measured 39.3, and 29.7 if written unenlarged
+    # dB; measured 39.3, and 29.7 if written unenlarged
+    assert 10 * np.log10(255**2 / error.mean()) > 37
 
 
 def test_red_stays_red(tmp_path):
@@ -172,7 +196,9 @@ def test_red_stays_red(tmp_path):
 
 def test_reading_twice_gives_identical_frames(tmp_path):
     video.write(tmp_path / "mine.mp4", film(), 25)
-    assert np.array_equal(video.read(tmp_path / "mine.mp4")[0], video.read(tmp_path / "mine.mp4")[0])
+    assert np.array_equal(
+        video.read(tmp_path / "mine.mp4")[0], video.read(tmp_path / "mine.mp4")[0]
+    )
 
 
 def test_central_square_of_a_wide_video_is_kept(tmp_path):
@@ -185,7 +211,10 @@ def test_central_square_of_a_wide_video_is_kept(tmp_path):
 
 def test_4k_video_is_shrunk_to_what_it_shows(tmp_path):
     small = film(4)
-    encode(tmp_path / "mine.mp4", [cv2.resize(f, (3840, 2160), interpolation=cv2.INTER_AREA) for f in small])
+    encode(
+        tmp_path / "mine.mp4",
+        [cv2.resize(f, (3840, 2160), interpolation=cv2.INTER_AREA) for f in small],
+    )
     frames, warnings = video.read(tmp_path / "mine.mp4")
     assert frames.shape == (4, 84, 84, 3) and warnings == []
 
@@ -218,7 +247,8 @@ def play(monkeypatch, frames):
 def test_memory_does_not_grow_with_the_length_of_a_4k_video(monkeypatch):
     one_frame = 2160 * 3840 * 3  # 25 MB
     frames = (
-        np.full((2160, 3840, 3), 8 * t, np.uint8) * (np.arange(3840) < 2000)[:, None] for t in range(15)
+        np.full((2160, 3840, 3), 8 * t, np.uint8) * (np.arange(3840) < 2000)[:, None]
+        for t in range(15)
     )
     tracemalloc.start()
     play(monkeypatch, frames)

@@ -1,4 +1,5 @@
-"""The meshcat mirror: what the browser is told equals what PyBullet knows, and nothing listens anywhere."""
+"""The meshcat mirror: what the browser is told equals what PyBullet knows, and nothing listens
+anywhere."""
 
 import base64
 import re
@@ -34,7 +35,8 @@ def low_poly_panda(client, folder):
 
 
 def primitives(client):
-    """A base and a hinged link, both with two shapes apart from their centres of mass, all kinds of shape."""
+    """A base and a hinged link, both with two shapes apart from their centres of mass, all kinds of
+    shape."""
     p.setGravity(0, 0, -9.81, client)
     turn = p.getQuaternionFromEuler
 
@@ -68,13 +70,19 @@ def commands(page):
     line = re.search(r"for \(const command of (\[.*\])\)", page).group(1)
     numbers = {0x16: "<u4", 0x17: "<f4"}
     ext = {k: lambda e, t=t: np.frombuffer(e.data, t) for k, t in numbers.items()}
-    return [umsgpack.unpackb(base64.b64decode(c), ext_handlers=ext) for c in re.findall(r"'([^']+)'", line)]
+    return [
+        umsgpack.unpackb(base64.b64decode(c), ext_handlers=ext)
+        for c in re.findall(r"'([^']+)'", line)
+    ]
 
 
 def played(page, frame):
-    """What the browser draws at a frame: a list of path, three.js geometry, 4x4 world pose, material."""
+    """What the browser draws at a frame: a list of path, three.js geometry, 4x4 world pose,
+    material."""
     told = commands(page)
-    fixed = {c["path"]: np.reshape(c["matrix"], (4, 4)).T for c in told if c["type"] == "set_transform"}
+    fixed = {
+        c["path"]: np.reshape(c["matrix"], (4, 4)).T for c in told if c["type"] == "set_transform"
+    }
     for c in told:
         for part in c.get("animations", []):
             at = {t["name"]: t["keys"][frame]["value"] for t in part["clip"]["tracks"]}
@@ -91,7 +99,9 @@ def depth(client):
     view = p.computeViewMatrix((0.6, -1.8, 1.2), (0.3, 0.1, 0.75), (0, 0, 1))
     near, far = 0.5, 5.0
     lens = p.computeProjectionMatrixFOV(32, 1, near, far)
-    z = p.getCameraImage(320, 320, view, lens, renderer=p.ER_TINY_RENDERER, physicsClientId=client)[3]
+    z = p.getCameraImage(320, 320, view, lens, renderer=p.ER_TINY_RENDERER, physicsClientId=client)[
+        3
+    ]
     return far * near / (far - (far - near) * np.reshape(z, (320, 320)))
 
 
@@ -106,7 +116,11 @@ def redrawn(page, frame):
         elif kind == "SphereGeometry":
             options = {"shapeType": p.GEOM_SPHERE, "radius": shape["radius"]}
         elif kind == "CylinderGeometry":
-            options = {"shapeType": p.GEOM_CYLINDER, "radius": shape["radiusTop"], "length": shape["height"]}
+            options = {
+                "shapeType": p.GEOM_CYLINDER,
+                "radius": shape["radiusTop"],
+                "length": shape["height"],
+            }
             pose = pose @ transform(
                 (0, 0, 0), p.getQuaternionFromEuler((-np.pi / 2, 0, 0))
             )  # z along their y
@@ -126,7 +140,8 @@ def assert_same_picture(a, b):
     seen = (a < 4) | (b < 4)
     assert seen.sum() > 8000  # of 102,400 pixels
     off = abs(a - b)[seen] > 1e-3  # m
-    assert off.mean() < 0.045  # TinyRenderer cuts the ends of capsules; a capsule too long is at 0.065
+    # TinyRenderer cuts the ends of capsules; a capsule too long is at 0.065
+    assert off.mean() < 0.045
 
 
 def quaternion(R):
@@ -144,7 +159,8 @@ def shake(client, body, rng):
 
 
 def test_primitives_look_in_the_browser_as_in_pybullet(client):
-    """Depths seen by one camera: rules out swapped axes, sizes, and forgotten inertial offsets at once."""
+    """Depths seen by one camera: rules out swapped axes, sizes, and forgotten inertial offsets at
+    once."""
     body = primitives(client)
     shake(client, body, np.random.default_rng(0))
     recorder = Recorder(client)
@@ -161,12 +177,15 @@ def test_the_panda_looks_in_the_browser_as_in_pybullet(client, tmp_path):
 
 
 def test_links_stand_where_the_urdf_puts_them(client, tmp_path):
-    """Forward kinematics of the URDF, multiplied out by hand, in ten random states, to a micrometre."""
+    """Forward kinematics of the URDF, multiplied out by hand, in ten random states, to a
+    micrometre."""
     body = low_poly_panda(client, tmp_path)
     recorder, rng, wanted = Recorder(client), np.random.default_rng(2), []
     base = transform((0.1, 0.2, 0.3), p.getQuaternionFromEuler((0.1, 0.2, 0.3)))
     joints = ET.parse(tmp_path / "arm.urdf").getroot().findall("joint")
-    number = {p.getJointInfo(body, j, client)[1].decode(): j for j in range(p.getNumJoints(body, client))}
+    number = {
+        p.getJointInfo(body, j, client)[1].decode(): j for j in range(p.getNumJoints(body, client))
+    }
     for _ in range(10):
         shake(client, body, rng)
         recorder.snap()
@@ -174,7 +193,9 @@ def test_links_stand_where_the_urdf_puts_them(client, tmp_path):
         for joint in joints:  # the file lists parents first
             link, origin = number[joint.get("name")], joint.find("origin")
             xyz, rpy = ([float(v) for v in origin.get(k).split()] for k in ("xyz", "rpy"))
-            T = world[joint.find("parent").get("link")] @ transform(xyz, p.getQuaternionFromEuler(rpy))
+            T = world[joint.find("parent").get("link")] @ transform(
+                xyz, p.getQuaternionFromEuler(rpy)
+            )
             if joint.get("type") != "fixed":
                 axis = np.array([float(v) for v in joint.find("axis").get("xyz").split()])
                 q = p.getJointState(body, link, client)[0]
@@ -184,7 +205,8 @@ def test_links_stand_where_the_urdf_puts_them(client, tmp_path):
             world[joint.find("child").get("link")] = T
         wanted.append({number[j.get("name")]: world[j.find("child").get("link")] for j in joints})
     page = recorder.html("x")
-    flip = np.diag([-1, -1, 1, 1])  # the right finger's mesh is the left one's, turned by half about z
+    # the right finger's mesh is the left one's, turned by half about z
+    flip = np.diag([-1, -1, 1, 1])
     for i in range(10):
         for path, _, pose, _ in played(page, i):
             link = int(path.split("/")[3])
@@ -300,7 +322,9 @@ def test_on_paper_a_notebook_shows_a_picture_of_the_scene():
 
 
 def test_stl_and_obj_give_the_same_triangles(tmp_path):
-    corners = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 0, 0], [0, 1, 0], [-1, 0, 0]]], "<f4")
+    corners = np.array(
+        [[[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 0, 0], [0, 1, 0], [-1, 0, 0]]], "<f4"
+    )
     (tmp_path / "a.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv -1 0 0\nf 1 2/1 3//1 -1\n")
     rows = b"".join(b"\0" * 12 + c.tobytes() + b"\0\0" for c in corners)
     (tmp_path / "a.stl").write_bytes(b" " * 80 + np.uint32(2).tobytes() + rows)

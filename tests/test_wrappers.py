@@ -17,7 +17,9 @@ K = 4
 
 @pytest.fixture(scope="module", params=["mended", "literal"])
 def reward(request):
-    return KeypointReward(detect(demonstration()), detect(random_frames(300)), horizon=50, form=request.param)
+    return KeypointReward(
+        detect(demonstration()), detect(random_frames(300)), horizon=50, form=request.param
+    )
 
 
 def wrap(env, reward):
@@ -54,7 +56,8 @@ class Film(gym.Env):
 
 
 def play(env, steps=20):
-    """Observations (steps + 1, S) and rewards (steps,) of an episode under actions that do not matter."""
+    """Observations (steps + 1, S) and rewards (steps,) of an episode under actions that do not
+    matter."""
     observations, rewards = [env.reset(seed=0)[0]], []
     for _ in range(steps):
         observation, r, *_ = env.step(np.zeros(3, np.float32))
@@ -75,7 +78,10 @@ def test_gymnasium_has_nothing_to_complain_about(reward):
 
 def test_observation_is_x_y_of_one_keypoint_after_the_other():
     z, _ = KeypointObservation(ToyPush(), detect).reset(seed=0)
-    assert z.dtype == np.float32 and (z.reshape(K, 2) == detect(ToyPush().reset(seed=0)[0][None])[0]).all()
+    assert (
+        z.dtype == np.float32
+        and (z.reshape(K, 2) == detect(ToyPush().reset(seed=0)[0][None])[0]).all()
+    )
 
 
 def test_a_keypoint_off_the_image_is_put_on_its_edge():
@@ -87,11 +93,14 @@ def test_the_wrapper_pays_what_the_reward_says_of_the_two_frames(reward):
     frames = demonstration()
     _, paid = play(wrap(Film(frames), reward))
     z = detect(frames)
-    assert paid.tolist() == pytest.approx([reward(z[t], z[t + 1], t)[0] for t in range(20)], abs=1e-5)
+    assert paid.tolist() == pytest.approx(
+        [reward(z[t], z[t + 1], t)[0] for t in range(20)], abs=1e-5
+    )
 
 
 def test_observation_and_reward_are_functions_of_the_frames(reward):
-    """Another world with the same pictures, closed to inspection and paying 1,000 a step: no difference."""
+    """Another world with the same pictures, closed to inspection and paying 1,000 a step: no
+    difference."""
     frames = demonstration()
     poor, rich = play(wrap(Film(frames), reward)), play(wrap(Film(frames, reward=1000.0), reward))
     assert (poor[0] == rich[0]).all() and (poor[1] == rich[1]).all()
@@ -133,7 +142,8 @@ def test_reward_parts_are_told_beside_the_environments_own_info(reward):
     env.reset(seed=0)
     _, r, _, _, info = env.step(np.zeros(3, np.float32))
     assert (
-        r == pytest.approx(info["reward_parts"]["r1"] + info["reward_parts"]["r2"]) and "is_success" in info
+        r == pytest.approx(info["reward_parts"]["r1"] + info["reward_parts"]["r2"])
+        and "is_success" in info
     )
 
 
@@ -146,7 +156,9 @@ def test_stable_baselines_trains_on_it(reward):
     """Any agent that speaks Gymnasium can train on the kit; this one from outside."""
     sb3 = pytest.importorskip("stable_baselines3")
     env = wrap(gym.wrappers.TimeLimit(ToyPush(), 50), reward)
-    agent = sb3.SAC("MlpPolicy", env, learning_starts=50, policy_kwargs={"net_arch": [16, 16]}, seed=0)
+    agent = sb3.SAC(
+        "MlpPolicy", env, learning_starts=50, policy_kwargs={"net_arch": [16, 16]}, seed=0
+    )
     agent.learn(100)
     action, _ = agent.predict(env.reset(seed=0)[0], deterministic=True)
     assert env.action_space.contains(action)

@@ -1,15 +1,16 @@
 """A toy of the push task for tests: frames drawn with rectangles, dynamics in a dozen lines.
 
-A gripper on an arm (three visible parts) pushes a puck along a table, seen from the side. It has what
-makes the real task hard for a reward: a puck that only contact moves, a demonstration that pauses and
-is slower than the robot, keypoints with half a pixel of noise.
+A gripper on an arm (three visible parts) pushes a puck along a table, seen from the side. It has
+what makes the real task hard for a reward: a puck that only contact moves, a demonstration that
+pauses and is slower than the robot, keypoints with half a pixel of noise.
 """
 
 import gymnasium as gym
 import numpy as np
 
 BASE, START, PUCK, GOAL = np.array([-0.9, -0.3]), np.array([-0.5, 0.0]), 0.0, 0.55
-TABLE, HALF_PUCK, HALF_GRIPPER, STEP = 0.6, 0.1, 0.06, 0.08  # all in keypoint units, 1 = half the image
+# all in keypoint units, 1 = half the image
+TABLE, HALF_PUCK, HALF_GRIPPER, STEP = 0.6, 0.1, 0.06, 0.08
 COLOURS = (60, 120, 180, 240)  # elbow, wrist, gripper, puck
 
 
@@ -53,14 +54,17 @@ class ToyPush(gym.Env):
     def frame(self):
         image = np.zeros((84, 84, 3), np.uint8)
         half = np.array([[0.06, 0.06], [0.06, 0.06], [HALF_GRIPPER] * 2, [HALF_PUCK] * 2])
-        low, high = (np.clip((self.parts() + s * half + 1) * 42, 0, 84).round().astype(int) for s in (-1, 1))
+        low, high = (
+            np.clip((self.parts() + s * half + 1) * 42, 0, 84).round().astype(int) for s in (-1, 1)
+        )
         for (x0, y0), (x1, y1), colour in zip(low, high, COLOURS, strict=True):
             image[y0:y1, x0:x1] = colour
         return image
 
 
 def detect(frames):
-    """Frames (B, 84, 84, 3) uint8 -> keypoints (B, 4, 2), the parts' centres; a hidden part gives (0, 0)."""
+    """Frames (B, 84, 84, 3) uint8 -> keypoints (B, 4, 2), the parts' centres; a hidden part gives
+    (0, 0)."""
     z = np.zeros((len(frames), 4, 2), np.float32)
     for b, image in enumerate(frames[..., 0]):
         for k, colour in enumerate(COLOURS):
@@ -71,7 +75,8 @@ def detect(frames):
 
 
 def follow(env, waypoints):
-    """Frames of a scripted arm that visits every (x, y) at `speed` and rests there for `pause` frames."""
+    """Frames of a scripted arm that visits every (x, y) at `speed` and rests there for `pause`
+    frames."""
     frames = [env.reset(seed=0)[0]]
     for x, y, speed, pause in waypoints:
         for _ in range(60):
@@ -86,7 +91,8 @@ def follow(env, waypoints):
 
 
 def demonstration(goal=GOAL):
-    """Frames of a slow 'human': rests, swings behind the puck, rests, pushes it to the goal, rests."""
+    """Frames of a slow 'human': rests, swings behind the puck, rests, pushes it to the goal,
+    rests."""
     env = ToyPush()
     reach = HALF_PUCK + HALF_GRIPPER
     behind, end = (-0.26, 0.5, 0.35, 4), (goal - reach, 0.5, 0.5, 3)

@@ -1,8 +1,9 @@
 """Grade a folder of submissions: `python -m tests.grade FOLDER`.
 
-One folder or one notebook each. A submission is a job of its own: FOLDER may be a single one, too. Out, in
-`--out`: class.csv, junit.xml, and for each submission a folder with result.json, feedback.html and, on
-request, Gradescope's results.json. What is finished is not graded again unless it or the checks changed.
+One folder or one notebook each. A submission is a job of its own: FOLDER may be a single one, too.
+Out, in `--out`: class.csv, junit.xml, and for each submission a folder with result.json,
+feedback.html and, on request, Gradescope's results.json. What is finished is not graded again
+unless it or the checks changed.
 """
 
 from __future__ import annotations
@@ -34,16 +35,24 @@ SEED = 2  # other inputs than those of the students' own checks, which could be 
 
 
 def main(argv=None) -> int:
-    """Returns the exit code: 2 where there is nothing to grade, 1 if the grader failed on a submission, 130
-    if it was interrupted."""
-    parser = argparse.ArgumentParser(prog="python -m tests.grade", description=__doc__.split("\n")[0])
+    """Returns the exit code: 2 where there is nothing to grade, 1 if the grader failed on a
+    submission, 130 if it was interrupted."""
+    parser = argparse.ArgumentParser(
+        prog="python -m tests.grade", description=__doc__.split("\n")[0]
+    )
     parser.add_argument("folder", type=Path, help="submissions: one folder or one notebook each")
     parser.add_argument("--out", type=Path, default=Path("grades"))
-    parser.add_argument("--notebooks", help="numbers, such as 5 or 5,6; default: all that anyone handed in")
-    parser.add_argument("--seed", type=int, default=SEED, help="of the inputs; students have 0 (%(default)s)")
+    parser.add_argument(
+        "--notebooks", help="numbers, such as 5 or 5,6; default: all that anyone handed in"
+    )
+    parser.add_argument(
+        "--seed", type=int, default=SEED, help="of the inputs; students have 0 (%(default)s)"
+    )
     jobs = {"type": int, "choices": range(1, 65), "default": 2, "metavar": "N"}
     parser.add_argument("-j", "--jobs", **jobs, help="submissions at a time")
-    parser.add_argument("--gradescope", action="store_true", help="write results.json for Gradescope, too")
+    parser.add_argument(
+        "--gradescope", action="store_true", help="write results.json for Gradescope, too"
+    )
     args = parser.parse_args(argv)
     try:
         entries = submissions(args.folder, args.out)
@@ -62,11 +71,14 @@ def main(argv=None) -> int:
     def job(entry):
         try:
             done = grade_once(entry, ids, args.out, args.gradescope, args.seed)
-        except Exception as e:  # the rest of the class goes on; without a result.json this is tried again
+        # the rest of the class goes on; without a result.json this is tried again
+        except Exception as e:
             traceback.print_exc()
             why = f"NOT GRADED, {type(e).__name__}: {e}"
             print(f"{entry.name}: {why}", file=sys.stderr)
-            return record(entry, [nothing(everything()[id], why) for id in ids], [why]) | {"failed": True}
+            return record(entry, [nothing(everything()[id], why) for id in ids], [why]) | {
+                "failed": True
+            }
         print(f"{entry.name}: {done['points']:g} of {done['most']:g}", flush=True)
         return done
 
@@ -92,7 +104,9 @@ def submissions(folder: Path, out: Path) -> list[Path]:
     if not folder.is_dir() and folder.suffix != ".ipynb":
         raise ValueError(f"{folder}: neither a folder nor a notebook; unpack an archive first")
     inside = {path.relative_to(folder) for path in notebooks(folder)}
-    if folder.is_file() or (inside and inside <= {path.relative_to(RELEASED) for path in RELEASED.glob("*")}):
+    if folder.is_file() or (
+        inside and inside <= {path.relative_to(RELEASED) for path in RELEASED.glob("*")}
+    ):
         print(f"{folder} is graded as one submission")
         return [folder]
     found = sorted(p for p in folder.iterdir() if not hidden(p) and p.resolve() != out.resolve())
@@ -102,7 +116,8 @@ def submissions(folder: Path, out: Path) -> list[Path]:
 
 
 def wanted(numbers: str | None, entries: list[Path]) -> list[str]:
-    """The exercises of notebooks by their numbers, "5" or "5,6"; else of all that the class handed in.
+    """The exercises of notebooks by their numbers, "5" or "5,6"; else of all that the class handed
+    in.
 
     Raises ValueError where there are none.
     """
@@ -112,12 +127,15 @@ def wanted(numbers: str | None, entries: list[Path]) -> list[str]:
     if strange := [n for n in given if n not in known]:
         raise ValueError(f"no notebook {', '.join(strange)}: there are {', '.join(known)}")
     if not given:
-        raise ValueError("nobody handed in a notebook of the course; --notebooks says which to expect")
+        raise ValueError(
+            "nobody handed in a notebook of the course; --notebooks says which to expect"
+        )
     return [id for id in everything() if id.split(".")[0] in given]
 
 
 def hidden(entry: Path) -> bool:
-    """Whether an entry of the class folder is the system's, such as .DS_Store, and nobody's work."""
+    """Whether an entry of the class folder is the system's, such as .DS_Store, and nobody's
+    work."""
     return entry.name[0] == "." and not notebooks(entry)
 
 
@@ -158,7 +176,9 @@ def grade(entry: Path, ids: list[str], seed: int = SEED) -> tuple[list[Result], 
                 results.append(nothing(known[id], "no cell with this exercise", open=True))
                 continue
             if given.elsewhere:
-                notes.append(f"{id} stands in {given.elsewhere}, too; that of {given.where} was graded")
+                notes.append(
+                    f"{id} stands in {given.elsewhere}, too; that of {given.where} was graded"
+                )
             results.append(grade_one(known[id], given, box, seed))
     return results, notes
 
@@ -175,7 +195,9 @@ def grade_one(exercise: Exercise, given: Answer, box: Sandbox, seed: int = 0) ->
         failed = box.open(exercise, given.source, given.helpers)
         if failed is not None:
             text = getattr(failed, "text", "")
-            return nothing(exercise, f"the cell does not run: {failed}: {text}" if text else f"{failed}")
+            return nothing(
+                exercise, f"the cell does not run: {failed}: {text}" if text else f"{failed}"
+            )
         return judge(exercise, box.call, seed, renew)
     except Lost as e:
         return nothing(exercise, str(e))
@@ -184,7 +206,8 @@ def grade_one(exercise: Exercise, given: Answer, box: Sandbox, seed: int = 0) ->
 
 
 def grade_once(entry: Path, ids: list[str], out: Path, gradescope: bool, seed: int) -> dict:
-    """Grade a submission and write its pages, unless that has been done for the same files and checks."""
+    """Grade a submission and write its pages, unless that has been done for the same files and
+    checks."""
     digest = fingerprint(entry, ids, seed)
     folder = out / safe(entry.name)
     path = folder / "result.json"
@@ -193,9 +216,12 @@ def grade_once(entry: Path, ids: list[str], out: Path, gradescope: bool, seed: i
         done = record(entry, *grade(entry, ids, seed)) | {"digest": digest}
         folder.mkdir(parents=True, exist_ok=True)
         write_atomic(folder / "feedback.html", feedback.page(done))
-        write_atomic(path, json.dumps(done, indent=1) + "\n")  # last: it says that all the rest is there
+        # last: it says that all the rest is there
+        write_atomic(path, json.dumps(done, indent=1) + "\n")
     if gradescope:
-        write_atomic(folder / "results.json", json.dumps(feedback.gradescope(done), indent=1) + "\n")
+        write_atomic(
+            folder / "results.json", json.dumps(feedback.gradescope(done), indent=1) + "\n"
+        )
     return done
 
 
@@ -211,7 +237,8 @@ def record(entry: Path, results: list[Result], notes: list[str]) -> dict:
 
 
 def safe(name: str) -> str:
-    """A file name for a submission's results, unique and harmless whatever the submission is called."""
+    """A file name for a submission's results, unique and harmless whatever the submission is
+    called."""
     plain = re.sub(r"[^A-Za-z0-9_-]+", "_", name.removesuffix(".ipynb"))[:60].strip("_")
     return f"{plain}-{hashlib.sha256(name.encode(errors='surrogateescape')).hexdigest()[:8]}"
 
@@ -235,9 +262,12 @@ def table(grades: list[dict], ids: list[str]) -> str:
     rows.writerow(["submission", "points", "of", *ids, "notes"])
     for g in grades:
         points = {e["id"]: f"{e['points']:g}" for e in g["exercises"]}
-        name = g["submission"] if g["submission"][0] not in "=+-@" else "'" + g["submission"]  # no formula
+        # no formula
+        name = g["submission"] if g["submission"][0] not in "=+-@" else "'" + g["submission"]
         notes = "; ".join(g["notes"])
-        rows.writerow([name, f"{g['points']:g}", f"{g['most']:g}", *(points[id] for id in ids), notes])
+        rows.writerow(
+            [name, f"{g['points']:g}", f"{g['most']:g}", *(points[id] for id in ids), notes]
+        )
     return text.getvalue()
 
 

@@ -6,11 +6,13 @@ A file in `tests/grade/exercises/` holds the exercises of one notebook:
     def r1(z, z_E):
         return -np.linalg.norm((z_E[:-1] - z).reshape(len(z_E) - 1, -1), axis=1).min()
 
-    r1.check("random keypoints", lambda rng: (rng.normal(size=(5, 2)), rng.normal(size=(9, 5, 2))), points=2)
-    r1.mistake("In Eq. 9 p ends at N - 1: your minimum includes the last frame.", "z_E[:-1]", "z_E")
+    r1.check("random keypoints", lambda rng: (rng.normal(size=(5, 2)), rng.normal(size=(9, 5, 2))),
+    points=2) r1.mistake("In Eq. 9 p ends at N - 1: your minimum includes the last frame.",
+    "z_E[:-1]", "z_E")
 
-The decorated code is the reference; a mistake is the reference with a piece of its text replaced. A wrong
-answer that equals a mistake's gets the mistake's hint. numpy as np, torch, F, nn and math are there.
+The decorated code is the reference; a mistake is the reference with a piece of its text replaced. A
+wrong answer that equals a mistake's gets the mistake's hint. numpy as np, torch, F, nn and math are
+there.
 """
 
 from __future__ import annotations
@@ -34,10 +36,11 @@ TRIALS = 3  # random inputs a check
 
 @dataclass
 class Check:
-    """`inputs(rng)` makes the arguments; the answer has to equal the reference's within the tolerances.
+    """`inputs(rng)` makes the arguments; the answer has to equal the reference's within the
+    tolerances.
 
-    verify(got, args) judges instead, where many answers are right: it returns a sentence, or None if all is
-    well.
+    verify(got, args) judges instead, where many answers are right: it returns a sentence, or None
+    if all is well.
     """
 
     label: str
@@ -79,12 +82,15 @@ class Exercise:
         """The id of its cell; nbgrader allows no dot."""
         return "ex-" + self.id.replace(".", "-")
 
-    def check(self, label, inputs, *, points=1, atol=1e-5, rtol=1e-4, trials=TRIALS, verify=None) -> None:
+    def check(
+        self, label, inputs, *, points=1, atol=1e-5, rtol=1e-4, trials=TRIALS, verify=None
+    ) -> None:
         """Add a check."""
         self.checks.append(Check(label, inputs, points, atol, rtol, trials, verify))
 
     def mistake(self, hint: str, *edits: str) -> None:
-        """Add a mistake: the reference with `edits` old, new, old, new ... replaced. Raises ValueError."""
+        """Add a mistake: the reference with `edits` old, new, old, new ... replaced. Raises
+        ValueError."""
         pairs = list(zip(edits[::2], edits[1::2], strict=True))
         missing = [old for old, _ in pairs if old not in self.source]
         if missing:
@@ -118,12 +124,15 @@ class Exercise:
 def exercise(id: str, title: str, *, given: tuple = (), probe: str = ""):
     """Make an exercise of the function or class below.
 
-    given: functions, classes, lines of code or other exercises that the answer may use. probe: see Exercise.
+    given: functions, classes, lines of code or other exercises that the answer may use. probe: see
+    Exercise.
     """
 
     def wrap(thing) -> Exercise:
         source = textwrap.dedent(inspect.getsource(thing))
-        source = source[min(source.find(word) for word in ("\ndef ", "\nclass ") if word in source) + 1 :]
+        source = source[
+            min(source.find(word) for word in ("\ndef ", "\nclass ") if word in source) + 1 :
+        ]
         before = "\n\n".join(map(_text, given))
         name = thing.__name__
         call = textwrap.dedent(probe) or f"probe = {name}\n"
@@ -184,7 +193,9 @@ def different(got, want, check: Check) -> str | None:
                 return f"{key}: {message}"
         return None
     return (
-        None if type(got) is type(want) and got == want else f"it returns {got!r:.60}; expected {want!r:.60}"
+        None
+        if type(got) is type(want) and got == want
+        else f"it returns {got!r:.60}; expected {want!r:.60}"
     )
 
 

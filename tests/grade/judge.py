@@ -1,7 +1,7 @@
 """Judging an answer: the same checks in the notebook, under pytest, and in the grader.
 
-The judge makes the inputs, keeps the references and compares; how an answer is called is somebody else's
-(`call`): the notebook calls its own function, the grader a process it does not trust.
+The judge makes the inputs, keeps the references and compares; how an answer is called is somebody
+else's (`call`): the notebook calls its own function, the grader a process it does not trust.
 """
 
 from __future__ import annotations
@@ -52,7 +52,9 @@ class Result:
         for o in self.outcomes:
             note = f": {o.message}" if o.message and o.message not in said else ""
             said.add(o.message)
-            lines.append(f"{'ok   ' if not o.message else 'wrong'} {o.points:g}/{o.most:g}  {o.label}{note}")
+            lines.append(
+                f"{'ok   ' if not o.message else 'wrong'} {o.points:g}/{o.most:g}  {o.label}{note}"
+            )
         return lines
 
 
@@ -65,9 +67,9 @@ def nothing(exercise: Exercise, message: str, open: bool = False) -> Result:
 def judge(exercise: Exercise, call, seed: int = 0, renew=None) -> Result:
     """Run all checks of an exercise on the answer behind call(args) -> (value, changed its inputs).
 
-    renew() starts that answer afresh, as if it had never been called. A call that raises Lost ends the
-    exercise: what was earned before stays. An answer that is the same for all inputs earns nothing, also
-    where it happens to be right; nor does one that hangs on what it was asked before.
+    renew() starts that answer afresh, as if it had never been called. A call that raises Lost ends
+    the exercise: what was earned before stays. An answer that is the same for all inputs earns
+    nothing, also where it happens to be right; nor does one that hangs on what it was asked before.
     """
     reference = exercise.run(exercise.source)
     mistakes = [(m.hint, exercise.run(exercise.wrong(m))) for m in exercise.mistakes]
@@ -92,17 +94,23 @@ def judge(exercise: Exercise, call, seed: int = 0, renew=None) -> Result:
             answers.append(got)
             truths.append(want)
             message = _message(check, got, want, args)
-            hints = [h for h, wrong in mistakes if _same(check, got, wrong(args), want)] if message else []
+            hints = (
+                [h for h, wrong in mistakes if _same(check, got, wrong(args), want)]
+                if message
+                else []
+            )
             if not message and changed:
                 message = "it changes its inputs: work on a copy"
             if trial == 0:
                 known.append((args, got))
-        result.outcomes.append(Outcome(check.label, 0 if message else check.points, check.points, message))
+        result.outcomes.append(
+            Outcome(check.label, 0 if message else check.points, check.points, message)
+        )
         guesses.append(hints)
     if all(o.message == UNDONE for o in result.outcomes):
         return nothing(exercise, UNDONE, open=True)
-    # On some inputs two mistakes give the same answer: the one that explains most checks is it, if that is
-    # half of what went wrong. A mistake that explains less happens to give the same there.
+    # On some inputs two mistakes give the same answer: the one that explains most checks is it, if
+    # that is half of what went wrong. A mistake that explains less happens to give the same there.
     votes = Counter(hint for hints in guesses for hint in set(hints))
     wrong = sum(o.points == 0 and o.message not in (lost, UNDONE) for o in result.outcomes)
     for outcome, hints in zip(result.outcomes, guesses, strict=True):
@@ -110,7 +118,9 @@ def judge(exercise: Exercise, call, seed: int = 0, renew=None) -> Result:
         outcome.message = max(likely, key=votes.get, default=outcome.message)
     if any(o.points for o in result.outcomes) and not lost:
         same = _all_same(answers) and not _all_same(truths)
-        message = "it returns the same, whatever it is given" if same else _repeat(known, call, renew)
+        message = (
+            "it returns the same, whatever it is given" if same else _repeat(known, call, renew)
+        )
         if message:
             for o in result.outcomes:
                 o.points, o.message = 0, o.message or message
@@ -130,13 +140,16 @@ def _message(check: Check, got, want, args) -> str:
 
 def _same(check: Check, got, theirs, want) -> bool:
     """Whether the answer is that of a mistake, and not right."""
-    if type(theirs) is Other or (type(theirs) is Raised and theirs.text != getattr(got, "text", None)):
+    if type(theirs) is Other or (
+        type(theirs) is Raised and theirs.text != getattr(got, "text", None)
+    ):
         return False
     return not different(got, theirs, check) and bool(different(want, theirs, check))
 
 
 EXACT = Check("", lambda rng: (), 0, 1e-6, 1e-6, 1, None)
-LOOSE = Check("", lambda rng: (), 0, 1e-5, 1e-4, 1, None)  # as a check, where it names no tolerances
+# as a check, where it names no tolerances
+LOOSE = Check("", lambda rng: (), 0, 1e-5, 1e-4, 1, None)
 
 
 def _all_same(values) -> bool:
@@ -147,8 +160,8 @@ def _all_same(values) -> bool:
 def _repeat(known, call, renew) -> str:
     """Inputs once more: a function's answer hangs on its inputs alone.
 
-    First the very first, then, of the answer afresh, one of every check, the last check first: an answer
-    that counts its calls, or remembers what it said, is at another place then.
+    First the very first, then, of the answer afresh, one of every check, the last check first: an
+    answer that counts its calls, or remembers what it said, is at another place then.
     """
     try:
         if not _agrees(known[0], call):
@@ -165,4 +178,6 @@ def _repeat(known, call, renew) -> str:
 def _agrees(pair, call) -> bool:
     args, before = pair
     again, _ = call(args)
-    return not different(again, before, EXACT) or (type(again) is type(before) is Other and again == before)
+    return not different(again, before, EXACT) or (
+        type(again) is type(before) is Other and again == before
+    )

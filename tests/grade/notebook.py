@@ -16,7 +16,8 @@ from tests.grade.sandbox import WALL
 
 
 class StillOpen(Exception):
-    """The notebook has come to an exercise that is not done; shown as one sentence, without a traceback."""
+    """The notebook has come to an exercise that is not done; shown as one sentence, without a
+    traceback."""
 
     def _render_traceback_(self):
         return [str(self)]
@@ -30,16 +31,20 @@ class Points(float):
 
 
 def check(id: str, seed: int = 0) -> Points:
-    """Check exercise `id` ("6.1"), as defined in the calling notebook; print what is right and what is not.
+    """Check exercise `id` ("6.1"), as defined in the calling notebook; print what is right and what
+    is not.
 
-    seed: other random inputs. Returns the points. Raises StillOpen, a quiet stop, while the exercise is open.
+    seed: other random inputs. Returns the points. Raises StillOpen, a quiet stop, while the
+    exercise is open.
     """
     exercise = find(id)
     space = sys._getframe(1).f_globals
     if exercise.name not in space:
         raise StillOpen(f"Exercise {id}: run the cell that defines {exercise.name} first.")
     if str(getattr(space[exercise.name], "__module__", "")).startswith("lbw_minimal"):
-        raise StillOpen(f"Exercise {id}: {exercise.name} is the package's own; write it with your own lines.")
+        raise StillOpen(
+            f"Exercise {id}: {exercise.name} is the package's own; write it with your own lines."
+        )
     result = judge(exercise, here(exercise, space), seed)
     if result.open:
         raise StillOpen(

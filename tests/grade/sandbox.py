@@ -1,8 +1,9 @@
 """A place for a student's code: a process that cannot read, write, send or stay.
 
-Two walls: bubblewrap (`bwrap`), where it is installed, shows it the Python installation and nothing else of
-the disk, no other process, no network. Inside, the process gives up files, calls and resources itself
-(Landlock, seccomp, limits, see `cell/worker.py`). `warning` says what is missing on this machine.
+Two walls: bubblewrap (`bwrap`), where it is installed, shows it the Python installation and nothing
+else of the disk, no other process, no network. Inside, the process gives up files, calls and
+resources itself (Landlock, seccomp, limits, see `cell/worker.py`). `warning` says what is missing
+on this machine.
 """
 
 from __future__ import annotations
@@ -44,16 +45,23 @@ def warning() -> str:
     files = "the kernel alone (Landlock) keeps this machine's files from the code of submissions"
     if not has_landlock():
         files = "the code of submissions can READ THE FILES of this machine, solutions included"
-    return (
-        f"bubblewrap is not installed: {files}. Install it before you grade (Debian: apt install bubblewrap)"
-    )
+    return f"bubblewrap is not installed: {files}. Install it before you grade (Debian: apt install bubblewrap)"
 
 
 def command(fd: int) -> list[str]:
     """How to start the worker: inside bubblewrap where there is one."""
     homes = {Path(p).resolve() for p in (sys.prefix, sys.base_prefix)} | {Path(sys.prefix), CELL}
     homes = sorted(map(str, homes))
-    python = [sys.executable, "-I", "-B", str(CELL / "worker.py"), str(fd), *SYSTEM, *DEVICES, *homes]
+    python = [
+        sys.executable,
+        "-I",
+        "-B",
+        str(CELL / "worker.py"),
+        str(fd),
+        *SYSTEM,
+        *DEVICES,
+        *homes,
+    ]
     bwrap = shutil.which("bwrap")
     if not bwrap:
         return python
@@ -67,7 +75,8 @@ def command(fd: int) -> list[str]:
 
 
 class Sandbox:
-    """One worker process; `open` an exercise, `call` it, `close` it. It is started again when lost."""
+    """One worker process; `open` an exercise, `call` it, `close` it. It is started again when
+    lost."""
 
     def __init__(self):
         self.process = self.channel = None
@@ -184,7 +193,9 @@ def _descendants(pid: int) -> list[int]:
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit():
             try:
-                parents[int(entry.name)] = int((entry / "stat").read_text().rsplit(")", 1)[1].split()[1])
+                parents[int(entry.name)] = int(
+                    (entry / "stat").read_text().rsplit(")", 1)[1].split()[1]
+                )
             except (OSError, IndexError, ValueError):
                 continue
     found = [pid]

@@ -1,4 +1,5 @@
-"""`pytest tests/grade -k 6.1`: the exercises as they stand in `notebooks/`. Those still open are skipped."""
+"""`pytest tests/grade -k 6.1`: the exercises as they stand in `notebooks/`. Those still open are
+skipped."""
 
 import pytest
 

@@ -1,7 +1,8 @@
 """Values as bytes, between the judge and the process where a student's code runs.
 
-Numbers, strings, None, lists, tuples, dicts, numpy arrays and torch tensors pass; anything else arrives as
-`Other`, its type's name. Nothing is unpickled: bytes from a hostile process become plain values or `Garbage`.
+Numbers, strings, None, lists, tuples, dicts, numpy arrays and torch tensors pass; anything else
+arrives as `Other`, its type's name. Nothing is unpickled: bytes from a hostile process become plain
+values or `Garbage`.
 """
 
 import json
@@ -76,7 +77,8 @@ def encode(value) -> bytes:
 
 
 def decode(data: bytes, tensor=None):
-    """The value of `encode`'s bytes. tensor: makes a tensor of an array; without it tensors stay arrays.
+    """The value of `encode`'s bytes. tensor: makes a tensor of an array; without it tensors stay
+    arrays.
 
     Raises Garbage.
     """
@@ -108,13 +110,19 @@ def decode(data: bytes, tensor=None):
             if "raised" in x:
                 return Raised(str(x["raised"])[:100], str(x["text"])[:1000])
             if "array" in x:
-                if x["array"] not in DTYPES or not all(type(k) is int and k >= 0 for k in x["shape"]):
+                if x["array"] not in DTYPES or not all(
+                    type(k) is int and k >= 0 for k in x["shape"]
+                ):
                     raise Garbage("no such array")
                 dtype = np.dtype(x["array"])
                 size = math.prod(x["shape"]) * dtype.itemsize
                 if len(x["shape"]) > 8 or place + size > len(data):
                     raise Garbage("an array longer than its bytes")
-                array = np.frombuffer(data, dtype, math.prod(x["shape"]), place).reshape(x["shape"]).copy()
+                array = (
+                    np.frombuffer(data, dtype, math.prod(x["shape"]), place)
+                    .reshape(x["shape"])
+                    .copy()
+                )
                 place += size
                 if x["kind"] == "scalar" and array.ndim == 0:
                     return array[()]

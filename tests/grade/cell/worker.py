@@ -1,7 +1,9 @@
-"""The process where a student's code runs: it gets source and inputs, and returns values. It judges nothing.
+"""The process where a student's code runs: it gets source and inputs, and returns values. It judges
+nothing.
 
-Started as `python -I worker.py FD READABLE...`, best inside bubblewrap. It imports the slow libraries once,
-and forks for every exercise; the fork confines itself before it runs a line of the student's.
+Started as `python -I worker.py FD READABLE...`, best inside bubblewrap. It imports the slow
+libraries once, and forks for every exercise; the fork confines itself before it runs a line of the
+student's.
 """
 
 import ast
@@ -37,7 +39,8 @@ class Hidden:
 
 
 def confine(memory: int, cpu: int, readable: list[str]) -> None:
-    """Limit this process for good. memory: bytes beyond what it has now; cpu: seconds; readable: paths."""
+    """Limit this process for good. memory: bytes beyond what it has now; cpu: seconds; readable:
+    paths."""
     with open("/proc/self/statm") as f:
         size = int(f.read().split()[0]) * os.sysconf("SC_PAGE_SIZE")
     limits = {
@@ -71,19 +74,22 @@ def _prctl(option: int, *args) -> None:
 
 
 CREATE_RULESET, ADD_RULE, RESTRICT_SELF = 444, 445, 446
-EVERY_ACCESS = (1 << 13) - 1  # all that Landlock's first version knows: execute, write, read, list, make ...
+# all that Landlock's first version knows: execute, write, read, list, make ...
+EVERY_ACCESS = (1 << 13) - 1
 READ_FILE, READ_DIR = 1 << 2, 1 << 3
 
 
 def has_landlock() -> bool:
-    """Whether this kernel has Landlock, which keeps files from a process (Linux 5.13, where switched on)."""
+    """Whether this kernel has Landlock, which keeps files from a process (Linux 5.13, where
+    switched on)."""
     with contextlib.suppress(OSError):
         return _call(CREATE_RULESET, None, ctypes.c_size_t(0), 1) >= 1
     return False
 
 
 def close_files(readable: list[str]) -> None:
-    """No file can be opened any more but those at or below the `readable` paths, to be read: Landlock."""
+    """No file can be opened any more but those at or below the `readable` paths, to be read:
+    Landlock."""
     handled = ctypes.c_uint64(EVERY_ACCESS)
     rules = _call(CREATE_RULESET, ctypes.byref(handled), ctypes.c_size_t(8), 0)
     for path in filter(os.path.exists, readable):
@@ -96,7 +102,8 @@ def close_files(readable: list[str]) -> None:
     os.close(rules)
 
 
-# A classic BPF program over struct seccomp_data: number at 0, architecture at 4, arguments at 16 + 8 i.
+# A classic BPF program over struct seccomp_data: number at 0, architecture at 4, arguments at 16 +
+# 8 i.
 LOAD, EQUAL, ANY_BIT, RETURN = 0x20, 0x15, 0x45, 0x06
 ALLOW, ERRNO = 0x7FFF0000, 0x00050000
 EPERM, ENOSYS = 1, 38
@@ -117,9 +124,16 @@ WRITING = 0x1 | 0x2 | 0x40 | 0x200 | 0x400  # O_WRONLY, O_RDWR, O_CREAT, O_TRUNC
 
 
 def filter_calls() -> None:
-    """No new process, no signal to another, no socket, no file opened for writing: Linux seccomp."""
-    program = [(LOAD, 0, 0, 4), (EQUAL, 1, 0, X86_64), (RETURN, 0, 0, ERRNO | EPERM), (LOAD, 0, 0, 0)]
-    program += [(ANY_BIT, 0, 1, 0x40000000), (RETURN, 0, 0, ERRNO | ENOSYS)]  # the x32 table of calls
+    """No new process, no signal to another, no socket, no file opened for writing: Linux
+    seccomp."""
+    program = [
+        (LOAD, 0, 0, 4),
+        (EQUAL, 1, 0, X86_64),
+        (RETURN, 0, 0, ERRNO | EPERM),
+        (LOAD, 0, 0, 0),
+    ]
+    # the x32 table of calls
+    program += [(ANY_BIT, 0, 1, 0x40000000), (RETURN, 0, 0, ERRNO | ENOSYS)]
     for number in DENIED.values():
         program += [(EQUAL, 0, 1, number), (RETURN, 0, 0, ERRNO | EPERM)]
     # glibc falls back to clone, whose flags a filter can read, where clone3 does not exist.
@@ -159,8 +173,8 @@ class Shell:
 def define(job: dict) -> tuple[dict, Exception | None]:
     """The names a student's code defines. Raises what it raises.
 
-    A cell that fails may do so in a line beside the answer, such as a plot or a print of the notebook's own
-    variables: then its definitions are run alone, and what it raised is returned.
+    A cell that fails may do so in a line beside the answer, such as a plot or a print of the
+    notebook's own variables: then its definitions are run alone, and what it raised is returned.
     """
     failed = None
     space = {"__name__": "__main__", "get_ipython": Shell, "display": print, "check": Shell().check}
@@ -173,7 +187,14 @@ def define(job: dict) -> tuple[dict, Exception | None]:
     except Exception as e:
         failed = e
         space.pop(job["name"], None)
-        kinds = ast.FunctionDef | ast.ClassDef | ast.Import | ast.ImportFrom | ast.Assign | ast.AnnAssign
+        kinds = (
+            ast.FunctionDef
+            | ast.ClassDef
+            | ast.Import
+            | ast.ImportFrom
+            | ast.Assign
+            | ast.AnnAssign
+        )
         for node in ast.parse(job["source"], "your cell").body:
             with contextlib.suppress(Exception):
                 if isinstance(node, kinds):
@@ -212,7 +233,8 @@ def run(job: dict, answer) -> None:
 
 
 class Answer:
-    """The way back to the judge; every message carries the number the judge gave to the exercise."""
+    """The way back to the judge; every message carries the number the judge gave to the
+    exercise."""
 
     def __init__(self, channel, number):
         self.channel, self.number = channel, number
@@ -226,7 +248,8 @@ class Answer:
 
 
 def main(fd: int, readable: list[str]) -> None:
-    """Serve exercises until the judge hangs up. readable: the paths that a student's code may read."""
+    """Serve exercises until the judge hangs up. readable: the paths that a student's code may
+    read."""
     channel = socket.socket(fileno=fd)
     space = {}
     exec(PREAMBLE, space)
