@@ -17,6 +17,11 @@ def module(name: str) -> ModuleType:
     return import_module(f"tasks.{name}")
 
 
+def sentence(name: str) -> str:
+    """What is to be done in the task: the first sentence of its file."""
+    return " ".join((module(name).__doc__ or "").partition("\n\n")[0].split())
+
+
 def id_of(name: str) -> str:
     """What Gymnasium calls the task."""
     return f"LbW-{name.capitalize()}-v0"

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from lbw_minimal.imitate import Recipe
-from tasks.world import DT, FINGER, RED, SUBSTEPS, Leg, TaskEnv
+from tasks.world import DT, FINGER, RED, SUBSTEPS, Leg, Part, TaskEnv
 
 HORIZON = 300  # control steps: 12 s
 RADIUS, HEIGHT = 0.028, 0.066  # m, of the mug
@@ -36,7 +36,7 @@ class Coffee(TaskEnv):
     START = (0.45, 0.0, 0.16)
     CONTACT = RADIUS + FINGER
 
-    def furnish(self):
+    def furnish(self) -> None:
         head = OUTLET + 0.015  # the hand fits in front of it
         self.world.box((0.05, 0.05, HEAD[1] / 2), (COLUMN + 0.05, 0, HEAD[1] / 2), MACHINE)
         half = ((COLUMN - head) / 2, 0.05, (HEAD[1] - HEAD[0]) / 2)
@@ -47,7 +47,7 @@ class Coffee(TaskEnv):
         if self.embodiment == "human":
             self.clutter()
 
-    def clutter(self):
+    def clutter(self) -> None:
         """The human's kitchen: tiles, a shelf with jars, and in front of it a lamp that swings."""
         rng = np.random.default_rng(0)
         for x in np.arange(0.24, 0.90, 0.055):
@@ -60,7 +60,7 @@ class Coffee(TaskEnv):
             rgba = (*rng.uniform((0.35, 0.35, 0.30), (0.75, 0.65, 0.55)), 1)
             self.world.cylinder(0.02, tall, (x, WALL - 0.04, 0.266 + tall / 2), rgba, solid=False)
 
-    def build(self):
+    def build(self) -> None:
         if self.embodiment == "human":
             self.lamp = self.world.sphere(
                 0.022, (LAMP[0], WALL - 0.08, LAMP[2]), SHADE, solid=False
@@ -68,37 +68,31 @@ class Coffee(TaskEnv):
         out, thick, tall = HANDLE
         bar = (out / 2, thick / 2, thick / 2)
         x = RADIUS + out / 2 - 0.002
-        self.mug = self.world.assembly(
+        upright = (thick / 2, thick / 2, (tall + thick) / 2)
+        self.mug = self.world.fixed(
             [
-                ("cylinder", (RADIUS, HEIGHT), (0, 0, 0), RED, MUG_MASS, True),
-                ("box", bar, (x, 0, tall / 2), RED, 0.001, False),
-                ("box", bar, (x, 0, -tall / 2), RED, 0.001, False),
-                (
-                    "box",
-                    (thick / 2, thick / 2, (tall + thick) / 2),
-                    (x + out / 2, 0, 0),
-                    RED,
-                    0.001,
-                    False,
-                ),
+                Part("cylinder", (RADIUS, HEIGHT), (0, 0, 0), RED, MUG_MASS),
+                Part("box", bar, (x, 0, tall / 2), RED, 0.001, solid=False),
+                Part("box", bar, (x, 0, -tall / 2), RED, 0.001, solid=False),
+                Part("box", upright, (x + out / 2, 0, 0), RED, 0.001, solid=False),
             ],
             (MUG_START, 0, HEIGHT / 2),
         )
         self.world.p.changeDynamics(self.mug, -1, lateralFriction=MUG_FRICTION)
 
-    def place(self, offset, scatter):
+    def place(self, offset: np.ndarray, scatter: bool) -> None:
         start = np.array([MUG_START, 0, HEIGHT / 2]) + offset
         self.put(self.mug, start, RADIUS, HEIGHT, SCATTER if scatter else None)
 
         self.time = self.np_random.uniform(0, PERIOD)
         self.swing()
 
-    def step(self, action):
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict]:
         self.time += DT * SUBSTEPS
         self.swing()
         return super().step(action)
 
-    def swing(self):
+    def swing(self) -> None:
         """Put the human's lamp where it is at this time."""
         if self.embodiment == "human":
             x = LAMP[0] + LAMP[1] * np.sin(2 * np.pi * self.time / PERIOD)
@@ -106,16 +100,16 @@ class Coffee(TaskEnv):
                 self.lamp, (x, WALL - 0.08, LAMP[2]), (0, 0, 0, 1)
             )
 
-    def object_position(self):
+    def object_position(self) -> np.ndarray:
         return self.world.position(self.mug)
 
-    def target_position(self):
+    def target_position(self) -> np.ndarray:
         return np.array([OUTLET, 0, HEIGHT / 2])
 
-    def is_success(self):
+    def is_success(self) -> bool:
         return self.distance() < SUCCESS
 
-    def waypoints(self):
+    def waypoints(self) -> list[Leg]:
         behind = self.object_position()[0] - self.CONTACT - 0.025
         end = np.array([OUTLET - self.CONTACT, 0, 0.03])
         return [

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from lbw_minimal.imitate import Recipe
-from tasks.world import FINGER, RED, Leg, TaskEnv
+from tasks.world import FINGER, RED, Leg, Part, TaskEnv
 
 HORIZON = 300  # control steps: 12 s
 OPEN = 0.15  # m, the joint stands at -OPEN when open, at 0 when shut
@@ -35,23 +35,23 @@ class Drawer(TaskEnv):
     START = (0.45, 0.0, 0.17)
     CONTACT = FINGER
 
-    def furnish(self):
+    def furnish(self) -> None:
         depth, width, height = CABINET
         half = depth / 2, width / 2, height / 2
         self.cabinet = self.world.box(half, (FRONT + depth / 2, 0, height / 2), WOOD)
 
-    def build(self):
-        half = [
+    def build(self) -> None:
+        panel, handle, box = (
             np.array(size) / 2 for size in (PANEL, HANDLE, (OPEN, 0.8 * PANEL[1], 0.5 * PANEL[2]))
-        ]
-        self.drawer = self.world.assembly(
+        )
+        self.drawer = self.world.sliding(
             [
-                ("box", half[0], (-PANEL[0] / 2, 0, 0), WOOD, DRAWER_MASS, True),
-                ("box", half[1], (-PANEL[0] - HANDLE[0] / 2, 0, 0), RED, 0.05, True),
-                ("box", half[2], (OPEN / 2, 0, 0), WOOD, 0.05, True),
+                Part("box", panel, (-PANEL[0] / 2, 0, 0), WOOD, DRAWER_MASS),
+                Part("box", handle, (-PANEL[0] - HANDLE[0] / 2, 0, 0), RED, 0.05),
+                Part("box", box, (OPEN / 2, 0, 0), WOOD, 0.05),
             ],
             (FRONT, 0, HEIGHT),
-            slides=(1, 0, 0),
+            axis=(1, 0, 0),
         )
         p = self.world.p
         # A velocity motor that wants 0 and has a limited force is dry friction.
@@ -62,7 +62,7 @@ class Drawer(TaskEnv):
             p.setCollisionFilterPair(self.drawer, self.cabinet, link, -1, 0)
         p.changeDynamics(self.drawer, 0, jointLowerLimit=-OPEN, jointUpperLimit=0)
 
-    def place(self, offset, scatter):
+    def place(self, offset: np.ndarray, scatter: bool) -> None:
         q = self.np_random.uniform(-OPEN, 0) if scatter else -OPEN + abs(offset[0])
         self.world.p.resetJointState(self.drawer, 0, q)
         tip, top = self.arm.goal, HEIGHT + PANEL[2] / 2 + 0.02
@@ -70,18 +70,18 @@ class Drawer(TaskEnv):
         if scatter and tip[0] > FRONT + q - REACH - 2 * FINGER and tip[2] < top:
             self.arm.reset(np.array([self.WORKSPACE[0][0] + 0.01, 0, tip[2]]))
 
-    def object_position(self):
+    def object_position(self) -> np.ndarray:
         """The handle's grip, where one pushes."""
         q = self.world.p.getJointState(self.drawer, 0)[0]
         return np.array([FRONT + q - REACH, 0, HEIGHT])
 
-    def target_position(self):
+    def target_position(self) -> np.ndarray:
         return np.array([FRONT - REACH, 0, HEIGHT])
 
-    def is_success(self):
+    def is_success(self) -> bool:
         return self.world.p.getJointState(self.drawer, 0)[0] >= SHUT
 
-    def waypoints(self):
+    def waypoints(self) -> list[Leg]:
         before = self.object_position() - (self.CONTACT + 0.02, 0, 0)
         # the goal leads: friction takes as much
         end = self.target_position() - (self.CONTACT - 0.02, 0, 0)

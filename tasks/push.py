@@ -25,27 +25,27 @@ class Push(TaskEnv):
     __doc__ = __doc__
     CONTACT = CUBE / 2 + FINGER
 
-    def furnish(self):
+    def furnish(self) -> None:
         self.world.cylinder(0.03, 0.001, (TARGET, 0, 0.0005), GREEN, solid=False)
 
-    def build(self):
+    def build(self) -> None:
         self.cube = self.world.box((CUBE / 2,) * 3, (CUBE_START, 0, CUBE / 2), RED, mass=CUBE_MASS)
         self.world.p.changeDynamics(self.cube, -1, lateralFriction=CUBE_FRICTION)
 
-    def place(self, offset, scatter):
+    def place(self, offset: np.ndarray, scatter: bool) -> None:
         start = np.array([CUBE_START, 0, CUBE / 2]) + offset
         self.put(self.cube, start, CUBE / 2, CUBE, SCATTER if scatter else None)
 
-    def object_position(self):
+    def object_position(self) -> np.ndarray:
         return self.world.position(self.cube)
 
-    def target_position(self):
+    def target_position(self) -> np.ndarray:
         return np.array([TARGET, 0, CUBE / 2])
 
-    def is_success(self):
+    def is_success(self) -> bool:
         return self.distance() < SUCCESS
 
-    def waypoints(self):
+    def waypoints(self) -> list[Leg]:
         behind = self.object_position()[0] - self.CONTACT - 0.025
         end = np.array([TARGET - self.CONTACT, 0, 0.02])
         return [

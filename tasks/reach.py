@@ -20,22 +20,22 @@ SUCCESS = 0.05  # m, distance from tip to target
 class Reach(TaskEnv):
     __doc__ = __doc__
 
-    def furnish(self):
+    def furnish(self) -> None:
         self.world.sphere(RADIUS, TARGET, GREEN, solid=False)
 
-    def place(self, offset, scatter):
+    def place(self, offset: np.ndarray, scatter: bool) -> None:
         """The target stands still, in random data too: only the arm moves in this task."""
 
-    def object_position(self):
+    def object_position(self) -> np.ndarray:
         return self.arm.tip_pose()[0]
 
-    def target_position(self):
+    def target_position(self) -> np.ndarray:
         return np.array(TARGET)
 
-    def is_success(self):
+    def is_success(self) -> bool:
         return self.distance() < SUCCESS
 
-    def waypoints(self):
+    def waypoints(self) -> list[Leg]:
         # the tip lags its goal by 2 / 20 s
         return [Leg(np.array(TARGET), 1.0), Leg(np.array(TARGET), 0.2)]
 

@@ -34,30 +34,30 @@ class Slide(TaskEnv):
     START = (0.46, 0.0, 0.15)
     CONTACT = RADIUS + FINGER
 
-    def furnish(self):
+    def furnish(self) -> None:
         self.world.cylinder(0.03, 0.001, (TARGET, 0, 0.0005), GREEN, solid=False)
 
-    def build(self):
+    def build(self) -> None:
         self.puck = self.world.cylinder(
             RADIUS, HEIGHT, (PUCK_START, 0, HEIGHT / 2), RED, mass=PUCK_MASS
         )
         self.world.p.changeDynamics(self.puck, -1, lateralFriction=PUCK_FRICTION)
 
-    def place(self, offset, scatter):
+    def place(self, offset: np.ndarray, scatter: bool) -> None:
         start = np.array([PUCK_START, 0, HEIGHT / 2]) + offset
         self.put(self.puck, start, RADIUS, HEIGHT, SCATTER if scatter else None)
 
-    def object_position(self):
+    def object_position(self) -> np.ndarray:
         return self.world.position(self.puck)
 
-    def target_position(self):
+    def target_position(self) -> np.ndarray:
         return np.array([TARGET, 0, HEIGHT / 2])
 
-    def is_success(self):
+    def is_success(self) -> bool:
         speed = np.linalg.norm(self.world.p.getBaseVelocity(self.puck)[0])
         return self.distance() < SUCCESS and speed < AT_REST
 
-    def waypoints(self):
+    def waypoints(self) -> list[Leg]:
         behind = self.object_position() * (1, 1, 0) + (-self.CONTACT - 0.04, 0, 0.02)
         end = behind + (STROKE, 0, 0)
         return [

@@ -154,7 +154,7 @@ def test_a_folder_of_the_users_own_files_is_never_emptied(tmp_path, capfd):
 
 def test_filming_ends_when_the_expert_never_succeeds(tmp_path, monkeypatch, capfd):
     monkeypatch.setattr("tasks.VIDEOS", tmp_path)
-    monkeypatch.setattr("tasks.__main__.record_expert", lambda env, seed: (None, None, False))
+    monkeypatch.setattr("tasks.commands.record.record_expert", lambda env, seed: (None, None, False))
     assert main(["record", "push"]) == 2
     assert "0 of 45 tries" in capfd.readouterr().err
 

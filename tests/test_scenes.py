@@ -6,7 +6,7 @@ import pytest
 from test_viewer import commands
 
 import tasks
-from tasks.viewer import mirror, transform
+from tasks.world.viewer import mirror, transform
 from tasks.world import World, expert_actions, random_actions
 
 SCENES = [(name, arm) for name in tasks.TASKS for arm in ("robot", "human")]

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from lbw_minimal.training import InputError
-from tasks import table
+from tasks.commands import ablation, table
 
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / "solutions" / "results"

@@ -15,7 +15,7 @@ import pybullet_data
 import pytest
 import umsgpack
 
-from tasks.viewer import Recorder, normals, read_mesh, transform
+from tasks.world.viewer import Recorder, normals, read_mesh, transform
 
 PANDA = Path(pybullet_data.getDataPath()) / "franka_panda" / "panda.urdf"
 

@@ -27,7 +27,7 @@ from meshcat import geometry as g
 from meshcat.animation import Animation, AnimationClip, AnimationTrack
 
 from lbw_minimal.training import write_atomic
-from tasks.world import TaskEnv
+from tasks.world.env import TaskEnv
 
 # m, from the side, like the environments' camera
 EYE, TARGET = (0.5, -1.2, 0.45), (0.42, 0.0, 0.22)
@@ -62,7 +62,7 @@ viewer.camera.position.set({eye});
 viewer.controls.target.set({target});
 viewer.controls.maxPolarAngle = Math.PI / 2;  // from below one sees the table only
 viewer.controls.update();
-if (window !== top) {{  // inside another page the wheel scrolls that page, until one clicks into the scene
+if (window !== top) {{  // in another page the wheel scrolls that page, until one clicks here
   viewer.controls.enableZoom = false;
   pane.addEventListener("pointerdown", () => viewer.controls.enableZoom = true);
   pane.addEventListener("mouseleave", () => viewer.controls.enableZoom = false);

@@ -7,16 +7,52 @@ saw. The truth goes into these figures and nowhere else.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
 import gymnasium as gym
 import numpy as np
 
+import tasks
+from lbw_minimal import video
+from lbw_minimal.imitate import Perception, load_perception
+from lbw_minimal.report import score
 from lbw_minimal.transporter import pixel_error, r2
+from tasks.commands import Parser, at_least
 from tasks.world import SIZE, record_expert, record_random
 
+SETS = ("robot", "translated", "transfer")
 NAMES = ("tip_x", "tip_y", "object_x", "object_y")
+PROBE_SEED = 2_000_000  # frames that no training saw
 
 
-def probe(task_id: str, perception, seed: int, frames: int = 400) -> dict:
+def parser() -> Parser:
+    """The arguments of `probe`."""
+    p = Parser("probe", "Measure how well the keypoints of a task tell where things are.")
+    p.add_task()
+    p.add_argument("--weights", type=Path, metavar="DIR", help="trained weights (those of the kit)")
+    p.add_argument("--frames", type=at_least(100), default=400, help="frames to measure on")
+    p.add_argument("--seed", type=at_least(0), default=0, help="of those frames")
+    return p
+
+
+def main(argv: list[str]) -> None:
+    """Print the figures. Raises InputError for a mistake in the arguments or the weights."""
+    args = parser().read(argv)
+    perception = load_perception(args.weights or tasks.WEIGHTS / args.task, args.task)
+    perception.watch(video.read(tasks.VIDEOS / args.task / "expert_01.mp4")[0])
+    found = probe(tasks.id_of(args.task), perception, PROBE_SEED + args.seed, args.frames)
+    print(f"{args.task}: R² of a linear map to the true pixels (error in pixels)")
+    print(f"{'':10s}" + "".join(f"{name:>16s}" for name in SETS))
+    for name in NAMES:
+        print(f"{name:10s}" + "".join(f"{score(found[where][name]):>16s}" for where in SETS))
+    for what in ("contact_px", "keypoint_std"):
+        if what in found:
+            print(f"{what}: {found[what]}")
+
+
+def probe(task_id: str, perception: Perception, seed: int, frames: int = 400) -> dict[str, Any]:
     """Figures of one task's perception, by frames filmed with seeds that no training uses.
 
     Returns R^2 per coordinate on robot and translated frames, each with the residual in pixels, and
@@ -42,11 +78,11 @@ def probe(task_id: str, perception, seed: int, frames: int = 400) -> dict:
     out = {}
     for name, (z_fit, px_fit, z_held, px_held) in sets.items():
         moves = px_held.std(0) > 0.5  # R^2 says nothing of what does not move
-        score = r2(z_fit, px_fit, z_held, px_held)
+        fit = r2(z_fit, px_fit, z_held, px_held)
         error = pixel_error(z_fit, px_fit, z_held, px_held)
         out[name] = {
             n: {"r2": round(float(s), 3) if m else None, "px": round(float(e), 2)}
-            for n, s, m, e in zip(NAMES, score, moves, error, strict=True)
+            for n, s, m, e in zip(NAMES, fit, moves, error, strict=True)
         }
     if robot.CONTACT:
         pixels = linear(z[:frames], truth[:frames])
@@ -59,20 +95,20 @@ def probe(task_id: str, perception, seed: int, frames: int = 400) -> dict:
     return out
 
 
-def in_picture(film, truth):
+def in_picture(film: np.ndarray, truth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """What shows tip and object: a puck may slide out of the picture."""
     seen = ((truth > 0) & (truth < SIZE)).all(1)
     return film[seen], truth[seen]
 
 
-def gap(px):
+def gap(px: np.ndarray) -> float:
     """Mean x from tip to object over the frames (T, 4) in which the object moves by half a pixel or
     more."""
     moving = np.abs(np.gradient(px[:, 2])) > 0.5
     return round(float((px[moving, 2] - px[moving, 0]).mean()), 2)
 
 
-def linear(z, pixels):
+def linear(z: np.ndarray, pixels: np.ndarray) -> Callable[[np.ndarray], np.ndarray]:
     """The least-squares map from keypoints (T, K, 2) to pixels (T, n), as a function."""
 
     def flat(z):

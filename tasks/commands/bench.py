@@ -17,6 +17,7 @@ from gymnasium.utils.performance import benchmark_step
 
 from lbw_minimal import munit, sac, transporter
 from tasks import TASKS, id_of
+from tasks.commands import Parser
 
 SECONDS = 5  # per figure
 
@@ -56,7 +57,14 @@ class PandaGymPush(gym.Wrapper):
         return out
 
 
-def main():
+def parser() -> Parser:
+    """The arguments of `bench`: none."""
+    return Parser("bench", "Steps, iterations and updates a second, for one core of this machine.")
+
+
+def main(argv: list[str]) -> None:
+    """Measure and print."""
+    parser().read(argv)
     torch.set_num_threads(1)
     speed = {}
     for task in TASKS:

@@ -1,0 +1,110 @@
+"""One file a command, each with its own arguments and help.
+
+What they share is here: how arguments are read, and how a mistake becomes one sentence.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from typing import NoReturn
+
+import tasks
+from lbw_minimal.training import InputError
+
+COMMANDS = {  # each a file in this folder
+    "record": "film the human videos of a task again",
+    "table": "the results of all tasks; what is missing is run first",
+    "ablation": "what each mend of the reward is worth",
+    "gallery": "one page with every task's scene, demonstration and rollout",
+    "viewer": "a task's scene as a page that turns with the mouse",
+    "probe": "how well the keypoints tell where things are",
+    "bench": "steps, iterations and updates a second on this machine",
+}
+
+
+class Parser(argparse.ArgumentParser):
+    """The arguments of one command. A mistake raises InputError with a sentence that says more."""
+
+    def __init__(self, command: str, description: str):
+        super().__init__(
+            prog=f"python -m tasks {command}",
+            description=description,
+            allow_abbrev=False,
+            formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+        )
+        self.command = command
+
+    def error(self, message: str) -> NoReturn:
+        raise InputError(
+            f"{self.command}: {message.removesuffix('.')}; {self.prog} --help tells more."
+        )
+
+    def read(self, argv: list[str]) -> argparse.Namespace:
+        """The arguments in `argv`; one that belongs to another command is refused with its name."""
+        args, unknown = self.parse_known_args(argv)
+        if not unknown:
+            return args
+        option = unknown[0].partition("=")[0]
+        if not option.startswith("-"):
+            self.error(f"{option!r} is one argument too many")
+        owners = [
+            f"python -m tasks {parser.command}"
+            for parser in parsers()
+            if option in parser.options()
+        ]
+        if owners:
+            owners = " and ".join(owners)
+            raise InputError(f"{self.command}: {option} does nothing here; it belongs to {owners}.")
+        self.error(f"there is no option {option}")
+
+    def options(self) -> set[str]:
+        """All options by their long names."""
+        return set(self._option_string_actions)
+
+    def add_task(self) -> None:
+        """The task as a positional argument."""
+        names = ", ".join(tasks.TASKS)
+        self.add_argument("task", type=task, metavar="TASK", help=f"one of {names}")
+
+
+def parsers() -> list[Parser]:
+    """The parser of every command."""
+    run = import_module("tasks.commands.run").parser("TASK")
+    return [run, *(import_module(f"tasks.commands.{name}").parser() for name in COMMANDS)]
+
+
+def task(name: str) -> str:
+    """The name of a task, for argparse."""
+    if name not in tasks.TASKS:
+        raise argparse.ArgumentTypeError(
+            f"there is no task {name}; choose one of {', '.join(tasks.TASKS)}"
+        )
+    return name
+
+
+def at_least(least: int) -> Callable[[str], int]:
+    """A type for argparse: a whole number of `least` or more."""
+
+    def number(text: str) -> int:
+        try:
+            value = int(text)
+        except ValueError:
+            value = least - 1
+        if value < least:
+            raise argparse.ArgumentTypeError(f"{text!r} is no whole number of {least} or more")
+        return value
+
+    return number
+
+
+def make_folder(out: Path) -> None:
+    """Make the folder `out`. Raises InputError where that cannot be."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"{out}: cannot write there ({error.strerror}); give another --out."
+        ) from None

@@ -1,0 +1,121 @@
+"""One page that shows all tasks: scene, demonstration, what the robot saw in it, and a rollout.
+
+In: the human videos and the trained weights that come with the kit. Out: `index.html` with the
+pictures in it, and beside it a scene for every task and arm that turns with the mouse, each a file
+of its own.
+"""
+
+from __future__ import annotations
+
+from html import escape
+from pathlib import Path
+
+import gymnasium as gym
+import numpy as np
+
+import tasks
+from lbw_minimal import sac, video
+from lbw_minimal.imitate import PACE, load_perception, watched
+from lbw_minimal.report import CSS, data_uri, demonstration, draw_keypoints, film, picture
+from lbw_minimal.training import write_atomic
+from tasks.commands import Parser, make_folder
+from tasks.commands.viewer import perform
+from tasks.world import record_random
+from tasks.world.scene import FPS
+from tasks.world.viewer import mirror
+
+SEED = 0  # of the rollout that is shown: no start jitter, as in the video
+TRIO = """
+.trio { display: grid; grid-template-columns: repeat(3, 1fr); gap: .5rem }
+.trio figure { margin: 0 }
+.trio img, .trio iframe { width: 100%; height: 17rem; object-fit: cover }
+@media (max-width: 40rem) { .trio { grid-template-columns: 1fr } }
+"""
+HEAD = """<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>LbW minimal: the five tasks</title>
+<style>{css}</style>
+</head>
+<body>
+<h1>The five tasks</h1>
+<p>Above in each row of pictures: frames of the one human video the robot learns from. Below: the
+same frames translated into the robot's world, with the keypoints found on them. Then both arms in
+scenes that turn with the mouse, and the robot's own view of what it learnt.</p>
+"""
+
+
+def parser() -> Parser:
+    """The arguments of `gallery`."""
+    p = Parser("gallery", "One page with every task's scene, demonstration and rollout.")
+    p.add_argument(
+        "--out", type=Path, default=Path("runs/gallery"), metavar="DIR", help="its folder"
+    )
+    return p
+
+
+def main(argv: list[str]) -> None:
+    """Write the gallery. Raises InputError for a mistake in the arguments or missing weights."""
+    print(f"gallery: {write(parser().read(argv).out)}")
+
+
+def write(out: Path) -> Path:
+    """Write the gallery into the folder `out` and return its page."""
+    make_folder(out)
+    page = [HEAD.format(css=CSS + TRIO)]
+    for name in tasks.TASKS:
+        page.append(section(name, out))
+        print(f"{name}: done", flush=True)
+    page.append("</body>\n</html>\n")
+    write_atomic(out / "index.html", "".join(page))
+    return out / "index.html"
+
+
+def section(name: str, out: Path) -> str:
+    """One task's part of the page; its scenes go to files beside it."""
+    demo, _ = video.read(tasks.VIDEOS / name / "expert_01.mp4")
+    perception = load_perception(tasks.WEIGHTS / name, name)
+    perception.watch(demo)
+    robot, _ = record_random(gym.make(tasks.id_of(name)).unwrapped, PACE, seed=0)
+    agent = sac.load(tasks.WEIGHTS / name / "policy.safetensors")
+    env, _ = watched(gym.make(tasks.id_of(name)), perception, robot)
+    frames, z, won = rollout(env, agent, out / f"{name}-robot.html")
+    human = gym.make(tasks.id_of(name), embodiment="human").unwrapped
+    perform(human, out / f"{name}-human.html", "The human, who shows it")
+
+    shown = data_uri("image/webp", film(draw_keypoints(frames, z), FPS / 2))
+    result = "what it sees at half speed: it " + ("succeeds" if won else "fails")
+    trio = [
+        (iframe(name, "human"), "the human, who shows it"),
+        (iframe(name, "robot"), "the robot, as it learnt it"),
+        (picture(shown, f"The robot does it: {name}"), result),
+    ]
+    cells = "".join(
+        f"<figure>{x}<figcaption>{caption}</figcaption></figure>" for x, caption in trio
+    )
+    columns = demonstration(demo, perception.translated, perception.z_E, FPS)
+    title = escape(tasks.sentence(name))
+    return f'<section><h2>{title}</h2>{columns}<div class="trio">{cells}</div></section>'
+
+
+def iframe(name: str, arm: str) -> str:
+    """The scene of a task and arm, loaded when it comes into view."""
+    return f'<iframe loading="lazy" title="{name}, {arm}" src="{name}-{arm}.html"></iframe>'
+
+
+def rollout(env: gym.Env, agent: sac.SAC, path: Path) -> tuple[np.ndarray, np.ndarray, bool]:
+    """Frames, keypoints and success of an episode of the policy, whose scene goes to a file."""
+    obs, _ = env.reset(seed=SEED)
+    base, K = env.unwrapped, env.get_wrapper_attr("keypoint_reward").z_E.shape[1]
+    frames, z, won, over, scene = [], [], False, False, mirror(base)
+    scene.snap()
+    while not over:
+        obs, _, _, over, info = env.step(agent.act(obs, deterministic=True))
+        frames.append(base.world.render())
+        z.append(obs[: 2 * K].reshape(K, 2))
+        won |= info["is_success"]
+        scene.snap()
+    scene.save(path, title="The robot, as it learnt")
+    return np.stack(frames), np.stack(z), won

@@ -1,0 +1,189 @@
+"""The results of all tasks: what is missing is run first, what is finished is not repeated.
+
+`python -m tasks table`: the paper's Table II, LbW row, five tasks and three seeds, mended and
+literal reward. Out: Markdown and JSON in `runs/table/`, where every run has a folder of its own.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import tasks
+from lbw_minimal.report import wilson
+from lbw_minimal.training import InputError, write_atomic
+from tasks.commands import Parser, at_least, make_folder
+from tasks.commands.run import TEST_EPISODES
+
+SEEDS = (0, 1, 2)
+PAPER = {"reach": 100, "push": 100, "slide": 80, "coffee": 70, "drawer": 80}  # %, Table II
+HEAD = [
+    "task",
+    "paper",
+    "mended (95 % interval)",
+    "by seed",
+    "literal",
+    "by seed",
+    "time",
+    "policy steps",
+]
+Row = dict[str, Any]  # a finished run, see `read`
+
+
+def parser(command: str = "table") -> Parser:
+    """The arguments of `table`, and of `ablation`, whose runs lie beside the table's."""
+    what = {
+        "table": "The results of all tasks",
+        "ablation": "What each mend of the reward is worth",
+    }
+    p = Parser(command, f"{what[command]}. What is missing is run first; it takes hours.")
+    p.add_argument("--jobs", type=at_least(1), default=1, help="runs at a time")
+    p.add_argument(
+        "--episodes", type=at_least(1), default=TEST_EPISODES, help="test episodes a run"
+    )
+    p.add_argument(
+        "--out", type=Path, default=Path("runs/table"), metavar="DIR", help="their folder"
+    )
+    return p
+
+
+def main(argv: list[str]) -> None:
+    """Print the table, after running what is missing. Raises InputError if a run fails."""
+    args = parser().read(argv)
+    print(table(args.out, args.jobs, args.episodes))
+
+
+def folder(out: Path, task: str, seed: int, change: str = "") -> Path:
+    """The folder of a run; change: "" (the recipe), "literal", or the mend that is left out."""
+    return out / (f"{task}-{seed}-{change}" if change else f"{task}-{seed}")
+
+
+def finished(path: Path, episodes: int) -> bool:
+    """Whether a run has ended with that many test episodes."""
+    note = path / "metrics.json"
+    return note.exists() and len(json.loads(note.read_text()).get("episodes", ())) == episodes
+
+
+def command(out: Path, task: str, seed: int, change: str, episodes: int) -> list[str]:
+    """The arguments of one run. A changed reward learns on the perception of the unchanged run."""
+    path = folder(out, task, seed, change)
+    args = [task, "--seed", str(seed), "--threads", "1", "--out", str(path)]
+    args += ["--episodes", str(episodes)]
+    if not change:
+        args.append("--from-scratch")
+    else:
+        args += ["--weights", str(folder(out, task, seed))]
+        args += ["--reward", "literal"] if change == "literal" else ["--without", change]
+    return args + ["--resume"] * (path / "settings.json").exists()
+
+
+def run_missing(out: Path, wanted: list[tuple[str, int, str]], jobs: int, episodes: int) -> None:
+    """Run what is not finished, `jobs` at a time, perception first.
+
+    A finished run with another number of test episodes is tested again, not trained. Raises
+    InputError if a run fails.
+    """
+
+    def run(job):
+        path = folder(out, *job)
+        if finished(path, episodes):
+            return
+        print(f"running {path.name}", flush=True)
+        with (out / f"{path.name}.log").open("a") as log:
+            line = [sys.executable, "-m", "tasks", *command(out, *job, episodes)]
+            code = subprocess.run(line, stdout=log, stderr=log).returncode
+        if code:
+            raise InputError(f"{path}: the run ended with code {code}; see {log.name}.")
+
+    make_folder(out)
+    bases = list(dict.fromkeys((task, seed, "") for task, seed, _ in wanted))
+    with ThreadPoolExecutor(jobs) as pool:
+        for some in (bases, [job for job in wanted if job[2]]):
+            list(pool.map(run, some))
+
+
+def read(out: Path, task: str, seed: int, change: str = "") -> Row:
+    """One finished run as a row: its wins, seconds a stage, steps, and R^2 of perception."""
+    metrics = json.loads((folder(out, task, seed, change) / "metrics.json").read_text())
+    return {
+        "task": task,
+        "seed": seed,
+        "change": change or "mended",
+        "wins": sum(e["success"] for e in metrics["episodes"]),
+        "wins_at_end": sum(e["success_at_end"] for e in metrics["episodes"]),
+        "episodes": len(metrics["episodes"]),
+        "stages": metrics["stages"],
+        "steps": metrics["settings"]["recipe"]["policy_steps"],
+        "memory_mb": metrics["memory_mb"],
+        "perception": metrics.get("perception"),
+    }
+
+
+def rate(rows: list[Row]) -> tuple[float, float, float]:
+    """Success rate of some runs together, with its 95 % interval."""
+    wins, n = sum(r["wins"] for r in rows), sum(r["episodes"] for r in rows)
+    return wins / n, *wilson(wins, n)
+
+
+def percent(rows: list[Row]) -> str:
+    """Success rate and interval in whole percent."""
+    mean, low, high = rate(rows)
+    return f"{100 * mean:.0f} % ({100 * low:.0f}-{100 * high:.0f})"
+
+
+def each(rows: list[Row]) -> str:
+    """Successes run by run."""
+    return ", ".join(f"{r['wins']}/{r['episodes']}" for r in rows)
+
+
+def markdown(head: list[str], rows: list[list[str]]) -> str:
+    """A table in Markdown."""
+    lines = [head, ["---"] * len(head), *rows]
+    return "".join("| " + " | ".join(line) + " |\n" for line in lines)
+
+
+def r_squared(row: Row, where: str) -> str:
+    """Tip x / y, object x / y of one run; a dash for what does not move."""
+    scores = [row["perception"][where][n]["r2"] for n in ("tip_x", "tip_y", "object_x", "object_y")]
+    return " / ".join("-" if s is None else f"{s:.3f}" for s in scores)
+
+
+def table(out: Path, jobs: int, episodes: int = TEST_EPISODES) -> str:
+    """Run what is missing, write table.md and table.json, and return the Markdown."""
+    changes = ("", "literal")
+    wanted = [(t, s, c) for c in changes for t in tasks.TASKS for s in SEEDS]
+    run_missing(out, wanted, jobs, episodes)
+    runs = {(t, c): [read(out, t, s, c) for s in SEEDS] for t in tasks.TASKS for c in changes}
+    text = markdown(
+        HEAD, [success(task, runs[task, ""], runs[task, "literal"]) for task in tasks.TASKS]
+    )
+    text += "\n" + markdown(
+        ["task", "seed", "R² of tip x / y, object x / y on robot frames", "on translated frames"],
+        [
+            [task, str(r["seed"]), r_squared(r, "robot"), r_squared(r, "translated")]
+            for task in tasks.TASKS
+            for r in runs[task, ""]
+        ],
+    )
+    write_atomic(out / "table.md", text)
+    write_rows(out / "table.json", runs)
+    return text
+
+
+def success(task: str, mended: list[Row], literal: list[Row]) -> list[str]:
+    """A task's row: the paper's rate, ours by form of the reward, time and policy steps."""
+    minutes = np.mean([sum(r["stages"].values()) for r in mended]) / 60
+    paper = f"{PAPER[task]} %" if task in PAPER else "-"
+    ours = [percent(mended), each(mended), percent(literal), each(literal)]
+    return [task, paper, *ours, f"{minutes:.0f} min", f"{mended[0]['steps']:,}"]
+
+
+def write_rows(path: Path, runs: dict[tuple[str, str], list[Row]]) -> None:
+    """Write all rows as JSON."""
+    write_atomic(path, json.dumps([r for some in runs.values() for r in some], indent=1) + "\n")
