@@ -9,7 +9,8 @@ import pytest
 import torch
 
 from lbw_minimal import video
-from tasks import TASKS, VIDEOS, WEIGHTS
+from lbw_minimal.training import InputError
+from tasks import TASKS, VIDEOS, WEIGHTS, commands
 from tasks.__main__ import main
 
 
@@ -102,12 +103,56 @@ def literal_without_a_mend(folder):
 
 
 def no_episodes(folder):
-    return ["push", "--evaluate", "--episodes", "0"], "--episodes 0"
+    return ["push", "--evaluate", "--episodes", "0"], "--episodes"
 
 
-MISTAKES = (missing, text, truncated, no_frames, one_frame, tiny, still, unknown_task, unknown_task_to_film,
-            no_task_to_film, nothing_to_resume, other_tasks_weights, cut_weights, no_weights, no_cuda,
-            no_such_device, literal_without_a_mend, no_episodes)  # fmt: skip
+def another_commands_option(folder):
+    return ["push", "--jobs", "9"], "python -m tasks table"
+
+
+def an_option_that_is_none(folder):
+    return ["push", "--vidoe", "x"], "--vidoe"
+
+
+def one_argument_too_many(folder):
+    return ["push", "reach"], "reach"
+
+
+def no_seed(folder):
+    return ["push", "--seed", "-1"], "'-1'"
+
+
+def no_such_field(folder):
+    return ["push", "--set", "steps=3"], "policy_steps"
+
+
+def no_such_value(folder):
+    return ["push", "--set", "policy_steps=many"], "'many'"
+
+
+def a_field_of_perception_that_is_not_trained(folder):
+    return ["push", "--set", "K=4"], "--from-scratch"
+
+
+def replaying_and_learning(folder):
+    return ["push", "--evaluate", "--set", "policy_steps=9"], "policy_steps=9"
+
+
+def weights_beside_training(folder):
+    return ["push", "--from-scratch", "--weights", folder], "--weights"
+
+
+def a_device_where_nothing_learns_on_it(folder):
+    return ["push", "--device", "cpu"], "--device"
+
+
+MISTAKES = (missing, text, truncated, no_frames, one_frame, tiny, still, unknown_task,
+            unknown_task_to_film, no_task_to_film, nothing_to_resume, other_tasks_weights,
+            cut_weights, no_weights, no_cuda, no_such_device, literal_without_a_mend, no_episodes,
+            another_commands_option, an_option_that_is_none, one_argument_too_many, no_seed,
+            no_such_field, no_such_value, a_field_of_perception_that_is_not_trained,
+            replaying_and_learning, weights_beside_training,
+            a_device_where_nothing_learns_on_it)  # fmt: skip
 
 
 @pytest.mark.parametrize("mistake", MISTAKES, ids=lambda f: f.__name__)
@@ -133,7 +178,9 @@ def test_the_shipped_policy_is_replayed_for_as_many_episodes_as_asked(tmp_path, 
     assert "A test episode" in (tmp_path / "report.html").read_text()
 
 
-@pytest.mark.parametrize("what", [["push", "--fast"], ["table"], ["ablation"], ["gallery"]])
+@pytest.mark.parametrize(
+    "what", [["push", "--fast"], ["table"], ["ablation"], ["gallery"], ["viewer", "push"]]
+)
 def test_a_folder_that_cannot_be_written_is_named(what, tmp_path, capfd):
     (tmp_path / "file").write_text("in the way")
     assert main([*what, "--out", str(tmp_path / "file" / "run")]) == 2
@@ -154,7 +201,9 @@ def test_a_folder_of_the_users_own_files_is_never_emptied(tmp_path, capfd):
 
 def test_filming_ends_when_the_expert_never_succeeds(tmp_path, monkeypatch, capfd):
     monkeypatch.setattr("tasks.VIDEOS", tmp_path)
-    monkeypatch.setattr("tasks.commands.record.record_expert", lambda env, seed: (None, None, False))
+    monkeypatch.setattr(
+        "tasks.commands.record.record_expert", lambda env, seed: (None, None, False)
+    )
     assert main(["record", "push"]) == 2
     assert "0 of 45 tries" in capfd.readouterr().err
 
@@ -172,3 +221,60 @@ def test_every_task_has_its_videos():
 def test_demonstration_and_random_video_have_the_papers_frames(name, frames):
     parts = [video.read(VIDEOS / name / f"{part}.mp4")[0] for part in ("expert_01", "random")]
     assert sum(map(len, parts)) == frames  # Table I
+
+
+PARSERS = {parser.command: parser for parser in commands.parsers()}
+OPTIONS = sorted(set().union(*(parser.options() for parser in PARSERS.values())) - {"-h", "--help"})
+
+
+@pytest.mark.parametrize("option", OPTIONS)
+@pytest.mark.parametrize("command", PARSERS)
+def test_every_option_is_a_commands_own_or_refused_with_the_name_of_its_command(command, option):
+    parser = PARSERS[command]
+    needed = ["push"] if any(a.dest == "task" for a in parser._actions) else []
+    if option in parser.options():
+        action = parser._option_string_actions[option]
+        value = {"--set": "K=3", "--reward": "literal", "--without": "trim"}.get(option, "200")
+        value = action.choices[-1] if action.choices else value
+        args = parser.read([*needed, option] + [value] * (action.nargs != 0))
+        assert getattr(args, action.dest) != action.default
+    else:
+        with pytest.raises(InputError) as error:
+            parser.read([*needed, option, "1"])
+        owners = [name for name, other in PARSERS.items() if option in other.options()]
+        assert str(error.value).startswith(f"{command}: {option} ")
+        assert all(f"python -m tasks {owner}" in str(error.value) for owner in owners)
+
+
+def test_no_command_prints_the_tasks_and_three_commands_to_try(capfd):
+    assert main([]) == 0
+    out = capfd.readouterr().out
+    tried = out.partition("try first:")[2]
+    assert all(f"  {name} " in out for name in (*TASKS, *commands.COMMANDS))
+    assert tried.count("python -m tasks ") == 4  # three, and how to read of options
+
+
+def test_the_recipe_is_set_and_the_report_says_so(tmp_path):
+    field = "policy_steps=60"
+    assert main(["reach", "--episodes", "1", "--out", str(tmp_path), "--set", field]) == 0
+    metrics = json.loads((tmp_path / "metrics.json").read_text())
+    assert metrics["settings"]["recipe"]["policy_steps"] == 60
+    assert json.loads((tmp_path / "policy_log.json").read_text())[-1]["step"] < 200
+    assert field in (tmp_path / "report.html").read_text()
+
+
+def test_a_policy_of_the_other_reward_is_refused(tmp_path, capfd):
+    arguments = ["push", "--evaluate", "--reward", "literal", "--out", str(tmp_path)]
+    assert main(arguments) == 2
+    assert "give the --reward it was trained with" in capfd.readouterr().err
+
+
+def test_viewer_writes_a_scene(tmp_path):
+    assert main(["viewer", "push", "--embodiment", "human", "--out", str(tmp_path)]) == 0
+    assert "the expert, as a human" in (tmp_path / "push-human.html").read_text()
+
+
+def test_probe_prints_what_the_keypoints_know(capfd):
+    assert main(["probe", "push", "--frames", "100"]) == 0
+    rows = {line.split()[0]: line.split()[1:] for line in capfd.readouterr().out.splitlines()}
+    assert float(rows["tip_x"][0]) > 0.98 and rows["object_y"][0] == "-"

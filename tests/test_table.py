@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from lbw_minimal.reward import MENDS
 from lbw_minimal.training import InputError
 from tasks.commands import ablation, table
 
@@ -35,7 +36,7 @@ def runs(tmp_path, monkeypatch):
     for task, wins in (("push", (10, 10, 9)), ("slide", (8, 7, 9))):
         for seed, n in enumerate(wins):
             finish(table.folder(tmp_path, task, seed), n)
-            for change in ("literal", *table.MENDS):
+            for change in ("literal", *MENDS):
                 finish(table.folder(tmp_path, task, seed, change), 0)
     return tmp_path
 
@@ -56,8 +57,8 @@ def test_row_has_the_rate_of_all_seeds_and_its_interval(runs):
 
 
 def test_ablation_has_a_row_a_mend_and_a_picture(runs):
-    text = table.ablation(runs, jobs=1)
-    assert len(text.splitlines()) == 2 + 2 + len(table.MENDS)
+    text = ablation.ablation(runs, jobs=1)
+    assert len(text.splitlines()) == 2 + 2 + len(MENDS)
     assert "| without timed | 0 % (0-11) | 0/10, 0/10, 0/10 |" in text
     assert (runs / "ablation.png").stat().st_size > 5000
 
@@ -73,17 +74,17 @@ def test_finished_runs_are_not_repeated_and_others_go_on(tmp_path, monkeypatch):
         return type("Done", (), {"returncode": 0})
 
     monkeypatch.setattr("subprocess.run", run)
-    table.run_missing(tmp_path, [("push", 0, "literal"), ("push", 1, "")], jobs=1)
+    table.run_missing(tmp_path, [("push", 0, "literal"), ("push", 1, "")], jobs=1, episodes=10)
     assert [" ".join(line).replace(f"{tmp_path}/", "") for line in started] == [
-        "push --seed 1 --threads 1 --out push-1 --from-scratch --resume",
-        "push --seed 0 --threads 1 --out push-0-literal --weights push-0 --reward literal",
+        "push --seed 1 --threads 1 --out push-1 --episodes 10 --from-scratch --resume",
+        "push --seed 0 --threads 1 --out push-0-literal --episodes 10 --weights push-0 --reward literal",
     ]
 
 
 def test_a_run_that_fails_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr("subprocess.run", lambda *a, **k: type("Done", (), {"returncode": 2}))
     with pytest.raises(InputError, match=r"push-0.*code 2"):
-        table.run_missing(tmp_path, [("push", 0, "")], jobs=1)
+        table.run_missing(tmp_path, [("push", 0, "")], jobs=1, episodes=10)
 
 
 def read(path):
@@ -112,7 +113,7 @@ def test_shipped_tables_are_those_of_the_shipped_runs(tmp_path, monkeypatch):
     out = shutil.copytree(RESULTS / "runs", tmp_path / "table")
     monkeypatch.setattr("subprocess.run", lambda *_, **__: pytest.fail("a run is missing"))
     readme = (ROOT / "README.md").read_text()
-    for name, make in (("table", table.table), ("ablation", table.ablation)):
+    for name, make in (("table", table.table), ("ablation", ablation.ablation)):
         assert make(out, jobs=1) == (RESULTS / f"{name}.md").read_text()
         assert (out / f"{name}.json").read_text() == (RESULTS / f"{name}.json").read_text()
         for part in (RESULTS / f"{name}.md").read_text().split("\n\n"):

@@ -158,7 +158,14 @@ def refuse_idle_options(args: argparse.Namespace, from_scratch: bool) -> None:
         idle += [("--device", args.device, "only perception learns there; add --from-scratch")]
     for option, given, why in idle:
         if given:
-            raise InputError(f"{option} does nothing here: {why}.")
+            value = (
+                ""
+                if given is True
+                else f" {', '.join(given)}"
+                if option == "--set"
+                else f" {given}"
+            )
+            raise InputError(f"{option}{value} does nothing here: {why}.")
 
 
 def read_settings(given: list[str], from_scratch: bool) -> dict[str, Any]:

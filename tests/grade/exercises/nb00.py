@@ -11,7 +11,9 @@ def success_rate(distances, threshold):
 
 
 success_rate.check("ten episodes", lambda rng: (rng.uniform(0, 0.1, 10), 0.05))
-success_rate.check("any number of episodes, any threshold", lambda rng: (rng.uniform(0, 1, 37), 0.3))
+success_rate.check(
+    "any number of episodes, any threshold", lambda rng: (rng.uniform(0, 1, 37), 0.3)
+)
 success_rate.check("all of them", lambda rng: (rng.uniform(0, 0.04, 5), 0.05))
 success_rate.check(
     "a distance equal to the threshold is not below it",
@@ -23,7 +25,9 @@ success_rate.mistake(
     "distances > threshold",
 )
 success_rate.mistake(
-    "You return how many succeeded; a rate is that number divided by all episodes.", ".mean()", ".sum()"
+    "You return how many succeeded; a rate is that number divided by all episodes.",
+    ".mean()",
+    ".sum()",
 )
 success_rate.mistake(
     "You return per cent; a rate lies between 0 and 1.",
@@ -48,7 +52,9 @@ def to_pixels(z, size):
 
 
 to_pixels.check("keypoints anywhere", lambda rng: (rng.uniform(-1, 1, (5, 2)), 84))
-to_pixels.check("a whole trajectory, another size", lambda rng: (rng.uniform(-1, 1, (9, 5, 2)), 200))
+to_pixels.check(
+    "a whole trajectory, another size", lambda rng: (rng.uniform(-1, 1, (9, 5, 2)), 200)
+)
 to_pixels.check("the corners", lambda rng: (np.array([[-1.0, -1.0], [1.0, 1.0]]), 84))
 to_pixels.mistake(
     "y already runs down in keypoints, as rows do in a picture: it needs no turning round.",
@@ -69,5 +75,7 @@ to_pixels.mistake(
     "/ 2 * (size - 1)",
 )
 to_pixels.mistake(
-    "x comes first in both: column before row.", "(z + 1) / 2 * size", "(z[..., ::-1] + 1) / 2 * size"
+    "x comes first in both: column before row.",
+    "(z + 1) / 2 * size",
+    "(z[..., ::-1] + 1) / 2 * size",
 )

@@ -24,8 +24,12 @@ response.mistake(
     "(1 + w * t) * ",
     "",
 )
-response.mistake("That oscillates: with kd = 2 sqrt(kp) there is no cosine.", "(1 + w * t)", "np.cos(w * t)")
-response.mistake("Your spring runs away: the exponent is negative.", "np.exp(-w * t)", "np.exp(w * t)")
+response.mistake(
+    "That oscillates: with kd = 2 sqrt(kp) there is no cosine.", "(1 + w * t)", "np.cos(w * t)"
+)
+response.mistake(
+    "Your spring runs away: the exponent is negative.", "np.exp(-w * t)", "np.exp(w * t)"
+)
 
 
 def _arm(rng):
@@ -48,10 +52,14 @@ task_inertia.mistake(
     "J @ np.linalg.inv(M) @ J.T",
 )
 task_inertia.mistake(
-    "Mobilities add up along J, inertias do not: M has to be inverted inside.", "np.linalg.inv(M)", "M"
+    "Mobilities add up along J, inertias do not: M has to be inverted inside.",
+    "np.linalg.inv(M)",
+    "M",
 )
 task_inertia.mistake(
-    "J maps joints to the tip, (6, 7): the transpose goes last.", "J @ np.linalg.inv(M) @ J.T", "J.T @ J"
+    "J maps joints to the tip, (6, 7): the transpose goes last.",
+    "J @ np.linalg.inv(M) @ J.T",
+    "J.T @ J",
 )
 
 
@@ -62,7 +70,13 @@ def osc(J, M, h, e, v, kp):
 
 
 def _errors(rng):
-    return *_arm(rng), rng.normal(size=7), rng.normal(size=6), rng.normal(size=6), float(rng.uniform(50, 900))
+    return (
+        *_arm(rng),
+        rng.normal(size=7),
+        rng.normal(size=6),
+        rng.normal(size=6),
+        float(rng.uniform(50, 900)),
+    )
 
 
 osc.check("an arm on its way", _errors, points=2)
@@ -70,7 +84,9 @@ osc.check(
     "at the goal and at rest only gravity is left",
     lambda rng: (*_arm(rng), rng.normal(size=7), np.zeros(6), np.zeros(6), 400.0),
 )
-osc.mistake("Nothing holds the arm up: gravity and Coriolis torques, h, have to be added.", " + h", "")
+osc.mistake(
+    "Nothing holds the arm up: gravity and Coriolis torques, h, have to be added.", " + h", ""
+)
 osc.mistake(
     "Without Lambda the gains are forces, not accelerations: stiff in one pose, slack in another.",
     "task_inertia(J, M) @ ",
@@ -152,7 +168,13 @@ class Point(gym.Env):
         self.x += 0.05 * float(np.clip(action[0], -1, 1))
         self.t += 1
         done = abs(self.x) < 0.05
-        return np.array([self.x], np.float32), float(done), False, self.t >= 50, {"is_success": done}
+        return (
+            np.array([self.x], np.float32),
+            float(done),
+            False,
+            self.t >= 50,
+            {"is_success": done},
+        )
 
 
 def _walk(rng, most=1, steps=20, ask="episode"):
@@ -175,7 +197,8 @@ Point.check(
     lambda rng: _walk(rng, 1, 51, "two episodes"),
 )
 Point.check(
-    "its observations are of the kind that observation_space promises", lambda rng: _walk(rng, 1, 2, "kind")
+    "its observations are of the kind that observation_space promises",
+    lambda rng: _walk(rng, 1, 2, "kind"),
 )
 Point.mistake(
     "The seed never reaches the generator: call super().reset(seed=seed) first.",
@@ -193,10 +216,14 @@ Point.mistake(
     "self.t >= 50, False",
 )
 Point.mistake(
-    "The fiftieth step is the last: count steps, and compare with >=.", "self.t >= 50", "self.t > 50"
+    "The fiftieth step is the last: count steps, and compare with >=.",
+    "self.t >= 50",
+    "self.t > 50",
 )
 Point.mistake(
-    "Success does not end the episode: it never terminates.", "float(done), False", "float(done), done"
+    "Success does not end the episode: it never terminates.",
+    "float(done), False",
+    "float(done), done",
 )
 Point.mistake(
     "At 0 the reward is 1.0 and is_success is True: yours never say so.",

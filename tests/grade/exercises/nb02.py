@@ -63,7 +63,11 @@ def _adds_up_to_one(got, args):
         return "it should return floating-point numbers"
     density = np.exp(np.minimum(log_pi.astype(float), 50))
     area = float((np.diff(a[:, 0]) * (density[1:] + density[:-1]) / 2).sum())
-    return None if abs(area - 1) < 0.01 else f"the density over all actions adds up to {area:.3f}; expected 1"
+    return (
+        None
+        if abs(area - 1) < 0.01
+        else f"the density over all actions adds up to {area:.3f}; expected 1"
+    )
 
 
 def _far_out(rng):
@@ -72,9 +76,13 @@ def _far_out(rng):
 
 
 squash.check("actions and log-densities near the middle", _moderate, atol=1e-3)
-squash.check("the density over all actions adds up to 1", _one_action, atol=1e-3, verify=_adds_up_to_one)
+squash.check(
+    "the density over all actions adds up to 1", _one_action, atol=1e-3, verify=_adds_up_to_one
+)
 squash.check("far out, where tanh is flat, it stays finite and right", _far_out, points=2)
-squash.check("their gradients reach mean and log_std", lambda rng: (*_moderate(rng), "gradient"), atol=1e-3)
+squash.check(
+    "their gradients reach mean and log_std", lambda rng: (*_moderate(rng), "gradient"), atol=1e-3
+)
 squash.mistake(
     "The values are right, but the gradient does not pass through u: leave detach out, the noise "
     "comes from outside.",
@@ -153,7 +161,9 @@ def _transitions(rng, ended=None, n=8):
 
 
 critic_target.check("in the middle of an episode", _transitions, points=2)
-critic_target.check("nothing comes after a terminal step", lambda rng: _transitions(rng, "terminal"))
+critic_target.check(
+    "nothing comes after a terminal step", lambda rng: _transitions(rng, "terminal")
+)
 critic_target.check("the time limit is not an end", lambda rng: _transitions(rng, "truncated"))
 critic_target.mistake(
     "You believe the larger of the two critics; the smaller one guards against errors upwards.",
@@ -297,14 +307,20 @@ def _temperature(rng, ask, entropy=0.0):
     return _uniform(rng, -3, -0.5), log_pi, target, ask
 
 
-temperature_loss.check("the value of the loss", lambda rng: _temperature(rng, "loss", rng.choice([-2, 2])))
 temperature_loss.check(
-    "entropy below its target: a step downhill raises alpha", lambda rng: _temperature(rng, "alpha", -2)
+    "the value of the loss", lambda rng: _temperature(rng, "loss", rng.choice([-2, 2]))
 )
 temperature_loss.check(
-    "entropy above its target: a step downhill lowers alpha", lambda rng: _temperature(rng, "alpha", 2)
+    "entropy below its target: a step downhill raises alpha",
+    lambda rng: _temperature(rng, "alpha", -2),
 )
-temperature_loss.check("no gradient reaches the policy", lambda rng: _temperature(rng, "policy", -2))
+temperature_loss.check(
+    "entropy above its target: a step downhill lowers alpha",
+    lambda rng: _temperature(rng, "alpha", 2),
+)
+temperature_loss.check(
+    "no gradient reaches the policy", lambda rng: _temperature(rng, "policy", -2)
+)
 temperature_loss.mistake(
     "With your sign alpha falls when the policy has too little entropy, and the policy freezes.",
     "-(alpha",
@@ -335,7 +351,9 @@ temperature_loss.mistake(
     "Eq. 18 is an expectation: the mean over the batch, not its sum.", ".mean()", ".sum()"
 )
 temperature_loss.mistake(
-    "The loss is one number, the mean over the batch; yours still has one for each row.", ".mean()", ""
+    "The loss is one number, the mean over the batch; yours still has one for each row.",
+    ".mean()",
+    "",
 )
 
 

@@ -102,10 +102,14 @@ minimum_jerk.mistake(
 def make_push(client):
     box = p.createCollisionShape(p.GEOM_BOX, halfExtents=(0.8, 0.3, 0.02), physicsClientId=client)
     table = p.createMultiBody(0, box, -1, (0.8, 0, -0.02), physicsClientId=client)
-    box = p.createCollisionShape(p.GEOM_BOX, halfExtents=(0.025, 0.025, 0.025), physicsClientId=client)
+    box = p.createCollisionShape(
+        p.GEOM_BOX, halfExtents=(0.025, 0.025, 0.025), physicsClientId=client
+    )
     cube = p.createMultiBody(0.4, box, -1, (0.53, 0, 0.025), physicsClientId=client)
     p.changeDynamics(table, -1, lateralFriction=1.0, physicsClientId=client)
-    p.changeDynamics(cube, -1, lateralFriction=0.6, linearDamping=0, angularDamping=0, physicsClientId=client)
+    p.changeDynamics(
+        cube, -1, lateralFriction=0.6, linearDamping=0, angularDamping=0, physicsClientId=client
+    )
     return table, cube
 
 
@@ -113,7 +117,9 @@ def _speed(rng, ask):
     return float(rng.uniform(0.3, 0.6)), ask
 
 
-make_push.check("both stand where they should, with mass and friction", lambda rng: _speed(rng, "bodies"))
+make_push.check(
+    "both stand where they should, with mass and friction", lambda rng: _speed(rng, "bodies")
+)
 make_push.check("it slides as it should", lambda rng: _speed(rng, "slide"), atol=2e-3)
 make_push.check(
     "flying free it keeps its speed and its turning", lambda rng: _speed(rng, "flight"), atol=2e-3
@@ -178,7 +184,9 @@ make_push.mistake(
     "createMultiBody(0.4",
     "createMultiBody(0",
 )
-make_push.mistake("Return the table first, then the cube.", "return table, cube", "return cube, table")
+make_push.mistake(
+    "Return the table first, then the cube.", "return table, cube", "return cube, table"
+)
 
 
 @exercise("3.3", "How often does it move?")
@@ -201,7 +209,8 @@ def _takes(rng, take=25, n=8):
 moving_share.check("eight takes", _takes, points=2)
 moving_share.check("takes of another length", lambda rng: _takes(rng, 12, 20))
 moving_share.check(
-    "nothing ever moves within a take", lambda rng: (np.repeat(rng.uniform(0.5, 0.7, 6), 10), 10, 0.0005)
+    "nothing ever moves within a take",
+    lambda rng: (np.repeat(rng.uniform(0.5, 0.7, 6), 10), 10, 0.0005),
 )
 moving_share.mistake(
     "Between two takes the cube is put elsewhere, and nobody pushed it: compare only within a take.",
@@ -211,7 +220,9 @@ moving_share.mistake(
 moving_share.mistake(
     "A cube pushed back moves as well: take the absolute difference.", "np.abs(np.diff", "(np.diff"
 )
-moving_share.mistake("More than `least`: a step of just `least` does not count.", "> least", ">= least")
+moving_share.mistake(
+    "More than `least`: a step of just `least` does not count.", "> least", ">= least"
+)
 moving_share.mistake(
     "A take of n frames has n - 1 transitions: divide by their number, not by that of the frames.",
     "moved.mean()",
@@ -243,11 +254,15 @@ def _wish(rng, far):
 to_action.check("a place within one step", lambda rng: _wish(rng, 0.5))
 to_action.check("a place far away: full action, no more", lambda rng: _wish(rng, 5.0))
 to_action.mistake(
-    "An action is at most 1: clip it.", "np.clip((wanted - goal) / step, -1, 1)", "(wanted - goal) / step"
+    "An action is at most 1: clip it.",
+    "np.clip((wanted - goal) / step, -1, 1)",
+    "(wanted - goal) / step",
 )
 to_action.mistake("An action is a share of the largest step: divide by it.", " / step", "")
 to_action.mistake(
-    "It leads from the goal now to the place wanted; yours leads back.", "wanted - goal", "goal - wanted"
+    "It leads from the goal now to the place wanted; yours leads back.",
+    "wanted - goal",
+    "goal - wanted",
 )
 to_action.mistake(
     "Clip each coordinate by itself: yours shortens the vector to length 1.",

@@ -41,7 +41,9 @@ adain.mistake(
     "(0, 2, 3)",
 )
 adain.mistake(
-    "You normalise over the channels: each channel keeps statistics of its own.", "(2, 3)", "(1, 2, 3)"
+    "You normalise over the channels: each channel keeps statistics of its own.",
+    "(2, 3)",
+    "(1, 2, 3)",
 )
 adain.mistake("Divide by the standard deviation, the root of the variance.", ".sqrt()", "")
 adain.mistake(
@@ -98,7 +100,9 @@ gan_losses.mistake(
     "return ((made - 1) ** 2).mean(), ((real - 1) ** 2).mean() + (made**2).mean()",
 )
 gan_losses.mistake(
-    "The critic has to judge both kinds; yours never sees a real frame.", "((real - 1) ** 2).mean() + ", ""
+    "The critic has to judge both kinds; yours never sees a real frame.",
+    "((real - 1) ** 2).mean() + ",
+    "",
 )
 gan_losses.mistake(
     "There may be more made scores than real ones: take the mean of each kind by itself, then add.",
@@ -141,7 +145,9 @@ def reconstructions(x, y, content, style, decode):
 
 
 reconstructions.check(
-    "two batches of images", lambda rng: (_tensor(rng, 2, 3, 6, 6), _tensor(rng, 2, 3, 6, 6)), points=3
+    "two batches of images",
+    lambda rng: (_tensor(rng, 2, 3, 6, 6), _tensor(rng, 2, 3, 6, 6)),
+    points=3,
 )
 reconstructions.check(
     "images of another size", lambda rng: (_tensor(rng, 1, 3, 9, 5), _tensor(rng, 1, 3, 9, 5) + 1)
@@ -193,11 +199,15 @@ def munit_loss(L, lam_image, lam_content, lam_style):
 
 def _losses(rng):
     names = [f"{kind}_{domain}" for kind in ("gan", "image", "content", "style") for domain in "xy"]
-    return {n: float(rng.uniform(0.1, 2)) for n in names}, *(float(rng.uniform(0.2, 10)) for _ in range(3))
+    return {n: float(rng.uniform(0.1, 2)) for n in names}, *(
+        float(rng.uniform(0.2, 10)) for _ in range(3)
+    )
 
 
 munit_loss.check("any losses, any weights", _losses)
-munit_loss.check("with all weights 0 the game is left", lambda rng: (_losses(rng)[0], 0.0, 0.0, 0.0))
+munit_loss.check(
+    "with all weights 0 the game is left", lambda rng: (_losses(rng)[0], 0.0, 0.0, 0.0)
+)
 munit_loss.mistake(
     "Both domains play: you add the losses of one.",
     '(L["content_x"] + L["content_y"])',

@@ -29,7 +29,9 @@ def soft_argmax(logits):
 
 
 soft_argmax.check("a clear peak is found where it is", lambda rng: (_peaks(rng),))
-soft_argmax.check("two things share the probability", lambda rng: (_tensor(rng, 2, 5, 21, 21, scale=2),))
+soft_argmax.check(
+    "two things share the probability", lambda rng: (_tensor(rng, 2, 5, 21, 21, scale=2),)
+)
 soft_argmax.check("logits as large as 200", lambda rng: (_tensor(rng, 1, 4, 8, 6, scale=200),))
 soft_argmax.mistake(
     "x and y are swapped: x runs along the last axis, to the right, and comes first.",
@@ -93,7 +95,8 @@ def _points(rng, K=5):
 heat_map.check("keypoints apart", lambda rng: (_points(rng, 1), 0.1, 21))
 heat_map.check("keypoints anywhere", lambda rng: (_points(rng), 0.2, 21))
 heat_map.check(
-    "two on one spot: no value above 1", lambda rng: (_points(rng, 1).expand(3, 4, 2).clone(), 0.3, 15)
+    "two on one spot: no value above 1",
+    lambda rng: (_points(rng, 1).expand(3, 4, 2).clone(), 0.3, 15),
 )
 heat_map.mistake(
     "Your maps sum past 1 where keypoints overlap: Eq. 6 wants one H per image, never above 1.",
@@ -173,9 +176,13 @@ transport.mistake(
     "(1 - h_y) * phi_x",
 )
 transport.mistake(
-    "What is pasted comes from y, at y's keypoints; yours comes from x.", "h_y * phi_y", "h_y * phi_x"
+    "What is pasted comes from y, at y's keypoints; yours comes from x.",
+    "h_y * phi_y",
+    "h_y * phi_x",
 )
-transport.mistake("What is pasted stands at y's keypoints, not at x's.", "+ h_y * phi_y", "+ h_x * phi_y")
+transport.mistake(
+    "What is pasted stands at y's keypoints, not at x's.", "+ h_y * phi_y", "+ h_x * phi_y"
+)
 transport.mistake(
     "x and y are exchanged: x's features stay, y's are pasted at y's keypoints.",
     "(1 - h_y) * phi_x + h_y * phi_y",
@@ -199,7 +206,9 @@ def _images(rng):
 
 
 loss.check("images anywhere", _images, points=2)
-loss.check("a perfect picture costs nothing", lambda rng: ((y := _images(rng))[1], y[1].clone(), y[2]))
+loss.check(
+    "a perfect picture costs nothing", lambda rng: ((y := _images(rng))[1], y[1].clone(), y[2])
+)
 loss.check(
     "a frame that is the median: every pixel counts once",
     lambda rng: ((y := _images(rng))[0], y[2].expand(2, 3, 8, 8).clone(), y[2]),
@@ -230,7 +239,9 @@ loss.mistake(
     "weight**2 * (y_hat - y) ** 2",
 )
 loss.mistake(
-    "Every pixel counts at least once: the weight is 1 + 10 times the difference.", "1 + 10 *", "10 *"
+    "Every pixel counts at least once: the weight is 1 + 10 times the difference.",
+    "1 + 10 *",
+    "10 *",
 )
 loss.mistake(
     "Squared differences: a missing object costs more than a blurred edge.",
@@ -261,7 +272,9 @@ def _follows(rng, noise=0.02):
 r2.check("keypoints that follow, with jitter", _follows, atol=1e-3)
 r2.check("keypoints that follow exactly", lambda rng: _follows(rng, 0), atol=1e-3)
 r2.check(
-    "keypoints that know nothing", lambda rng: (rng.normal(size=(60, 2, 2)), rng.normal(size=60)), atol=1e-3
+    "keypoints that know nothing",
+    lambda rng: (rng.normal(size=(60, 2, 2)), rng.normal(size=60)),
+    atol=1e-3,
 )
 r2.mistake(
     "You judge on the frames you fitted: keypoints that know nothing still fit a little. Fit on the first "
@@ -299,7 +312,9 @@ r2.mistake(
     "np.corrcoef(A[half:] @ W, held)[0, 1] ** 2",
 )
 r2.mistake(
-    "The map needs a constant: append a column of ones.", "np.ones((len(z), 1))", "np.zeros((len(z), 1))"
+    "The map needs a constant: append a column of ones.",
+    "np.ones((len(z), 1))",
+    "np.zeros((len(z), 1))",
 )
 r2.mistake("R^2 is 1 minus the share of the variance that is left.", "return 1 - (", "return (")
 r2.mistake(

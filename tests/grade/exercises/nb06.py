@@ -17,11 +17,21 @@ def r1(z, z_E):
 
 
 r1.check("keypoints anywhere", lambda rng: (rng.normal(size=(5, 2)), _walk(rng, 20)))
-r1.check("at a frame of the demonstration it is 0", lambda rng: ((z := _walk(rng, 12))[rng.integers(11)], z))
-r1.check("at its first frame, too: p begins at 1, z_E[0]", lambda rng: ((z := _walk(rng, 12))[0], z))
-r1.check("at the last frame it is not: p ends at N - 1", lambda rng: ((z := _walk(rng, 12))[-1] + 1, z + 1))
+r1.check(
+    "at a frame of the demonstration it is 0",
+    lambda rng: ((z := _walk(rng, 12))[rng.integers(11)], z),
+)
+r1.check(
+    "at its first frame, too: p begins at 1, z_E[0]", lambda rng: ((z := _walk(rng, 12))[0], z)
+)
+r1.check(
+    "at the last frame it is not: p ends at N - 1",
+    lambda rng: ((z := _walk(rng, 12))[-1] + 1, z + 1),
+)
 r1.mistake(
-    "A reward is larger when the robot is nearer: Eq. 9 has a minus in front.", "-distances", "distances"
+    "A reward is larger when the robot is nearer: Eq. 9 has a minus in front.",
+    "-distances",
+    "distances",
 )
 r1.mistake(
     "Your distance is squared: Eq. 9 has the norm, with its square root.",
@@ -29,8 +39,12 @@ r1.mistake(
     "((z_E[:-1] - z) ** 2).sum(axis=(1, 2))",
 )
 r1.mistake("Your minimum includes the last frame: in Eq. 9 p ends at N - 1.", "z_E[:-1]", "z_E")
-r1.mistake("Your minimum leaves out the first frame: p = 1 is z_E[0] in Python.", "z_E[:-1]", "z_E[1:-1]")
-r1.mistake("Eq. 9 takes the nearest frame, a minimum over p; you take the mean.", ".min()", ".mean()")
+r1.mistake(
+    "Your minimum leaves out the first frame: p = 1 is z_E[0] in Python.", "z_E[:-1]", "z_E[1:-1]"
+)
+r1.mistake(
+    "Eq. 9 takes the nearest frame, a minimum over p; you take the mean.", ".min()", ".mean()"
+)
 r1.mistake(
     "You take the mean distance of a keypoint: the norm is one length of all 2K numbers.",
     "np.sqrt(((z_E[:-1] - z) ** 2).sum(axis=(1, 2)))",
@@ -55,7 +69,10 @@ def r2(z, z_next, z_E):
     return -np.sqrt(((steps - step) ** 2).sum(axis=(1, 2))).min()
 
 
-r2.check("keypoints anywhere", lambda rng: (rng.normal(size=(5, 2)), rng.normal(size=(5, 2)), _walk(rng, 20)))
+r2.check(
+    "keypoints anywhere",
+    lambda rng: (rng.normal(size=(5, 2)), rng.normal(size=(5, 2)), _walk(rng, 20)),
+)
 r2.check(
     "a step of the demonstration, made elsewhere, earns 0",
     lambda rng: ((z := _walk(rng, 12))[4] + 3, z[5] + 3, z),
@@ -65,9 +82,19 @@ r2.check(
     lambda rng: ((z := _walk(rng, 12))[-2] + 3, z[-1] + 3, z),
 )
 r2.mistake("A step is z_{t+1} - z_t; yours has the opposite sign.", "z_next - z", "z - z_next")
-r2.mistake("A reward is larger when the step is nearer: Eq. 10 has a minus in front.", "-np.sqrt", "np.sqrt")
-r2.mistake("You compare places; Eq. 10 compares steps, z^E_{q+1} - z^E_q.", "z_E[1:] - z_E[:-1]", "z_E[:-1]")
-r2.mistake("Eq. 10 takes the nearest step, a minimum over q; you take the mean.", ".min()", ".mean()")
+r2.mistake(
+    "A reward is larger when the step is nearer: Eq. 10 has a minus in front.",
+    "-np.sqrt",
+    "np.sqrt",
+)
+r2.mistake(
+    "You compare places; Eq. 10 compares steps, z^E_{q+1} - z^E_q.",
+    "z_E[1:] - z_E[:-1]",
+    "z_E[:-1]",
+)
+r2.mistake(
+    "Eq. 10 takes the nearest step, a minimum over q; you take the mean.", ".min()", ".mean()"
+)
 r2.mistake(
     "N frames have N - 1 steps: you leave out the last, q = N - 1, to the last frame.",
     "z_E[1:] - z_E[:-1]",
@@ -100,10 +127,17 @@ episode_return.check("a random episode", lambda rng: (_walk(rng, 15), _walk(rng,
 episode_return.check("other weights", lambda rng: (_walk(rng, 9), _walk(rng, 20), 0.3, 2.5))
 episode_return.check(
     "a robot that never moves beside a demonstration that starts at rest",
-    lambda rng: (np.zeros((30, 5, 2)), np.concatenate([np.zeros((4, 5, 2)), _walk(rng, 20)]), 1.0, 1.0),
+    lambda rng: (
+        np.zeros((30, 5, 2)),
+        np.concatenate([np.zeros((4, 5, 2)), _walk(rng, 20)]),
+        1.0,
+        1.0,
+    ),
 )
 episode_return.mistake(
-    "T frames have T - 1 transitions: you leave out the last one.", "range(len(z) - 1)", "range(len(z) - 2)"
+    "T frames have T - 1 transitions: you leave out the last one.",
+    "range(len(z) - 1)",
+    "range(len(z) - 2)",
 )
 episode_return.mistake(
     "Eq. 9 judges z_t, the keypoints before the action; you take z_{t+1}.",
@@ -119,10 +153,16 @@ episode_return.mistake(
     "return total + lam1 * r1(z[-1], z_E)",
 )
 episode_return.mistake(
-    "Eq. 8 weighs the two parts: multiply r_1 by lam1 and r_2 by lam2.", "lam1 * ", "", "lam2 * ", ""
+    "Eq. 8 weighs the two parts: multiply r_1 by lam1 and r_2 by lam2.",
+    "lam1 * ",
+    "",
+    "lam2 * ",
+    "",
 )
 episode_return.mistake(
-    "Rewards add up over an episode; you return their mean.", "return total", "return total / (len(z) - 1)"
+    "Rewards add up over an episode; you return their mean.",
+    "return total",
+    "return total / (len(z) - 1)",
 )
 
 
@@ -173,14 +213,18 @@ trim.mistake(
     "range(1, len(z))",
 )
 trim.mistake(
-    "At least `least` away: a distance of just `least` is enough, >= and not >.", ">= least", "> least"
+    "At least `least` away: a distance of just `least` is enough, >= and not >.",
+    ">= least",
+    "> least",
 )
 trim.mistake(
     "The distance is the length of all 2K numbers, as in Eq. 9; you take the farthest keypoint's.",
     "np.linalg.norm(z[i] - z[kept[-1]])",
     "np.linalg.norm(z[i] - z[kept[-1]], axis=1).max()",
 )
-trim.mistake("Compare with the last frame you kept; you compare with the first one.", "z[kept[-1]]", "z[0]")
+trim.mistake(
+    "Compare with the last frame you kept; you compare with the first one.", "z[kept[-1]]", "z[0]"
+)
 trim.mistake(
     "The last frame is added to those you kept; yours takes its neighbour's place.",
     "kept + [len(z) - 1]",
@@ -194,7 +238,9 @@ def timed_r1(z_next, z_E, t):
     return -np.linalg.norm(z_next - target)
 
 
-timed_r1.check("on the way", lambda rng: (rng.normal(size=(5, 2)), _walk(rng, 20), int(rng.integers(18))))
+timed_r1.check(
+    "on the way", lambda rng: (rng.normal(size=(5, 2)), _walk(rng, 20), int(rng.integers(18)))
+)
 timed_r1.check(
     "at t = N - 1 its end has just passed",
     lambda rng: (rng.normal(size=(5, 2)), (z := _walk(rng, int(rng.integers(5, 20)))), len(z) - 1),
@@ -224,7 +270,9 @@ timed_r1.mistake(
     "np.linalg.norm(z_next - target, axis=1).sum()",
 )
 timed_r1.mistake(
-    "A reward is larger when the robot is nearer: there is a minus in front.", "-np.linalg", "np.linalg"
+    "A reward is larger when the robot is nearer: there is a minus in front.",
+    "-np.linalg",
+    "np.linalg",
 )
 timed_r1.mistake(
     "Here no minimum is taken: the frame is given by the time.",

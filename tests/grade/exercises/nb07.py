@@ -12,7 +12,9 @@ def stopping(v, mu):
 
 
 stopping.check("a puck on the kit's table", lambda rng: (float(rng.uniform(0.3, 1.5)), 0.1))
-stopping.check("other friction", lambda rng: (float(rng.uniform(0.3, 3)), float(rng.uniform(0.05, 0.8))))
+stopping.check(
+    "other friction", lambda rng: (float(rng.uniform(0.3, 3)), float(rng.uniform(0.05, 0.8)))
+)
 stopping.mistake(
     "Your distance is that of a puck that keeps its speed: the mean speed of a puck that stops is v / 2.",
     "v**2 / (2 * mu * g)",
@@ -49,7 +51,8 @@ def _shot(rng):
 
 speeds.check("targets in reach of a hit", _shot)
 speeds.check(
-    "so near that no hit at all is right, too", lambda rng: (0.03, 0.05, float(rng.uniform(0.05, 0.5)))
+    "so near that no hit at all is right, too",
+    lambda rng: (0.03, 0.05, float(rng.uniform(0.05, 0.5))),
 )
 speeds.mistake(
     "You take the slack as a slack of speed: find the nearest and the farthest place, then their speeds.",
@@ -71,7 +74,9 @@ speeds.mistake(
     "distance - slack, distance + slack",
     "distance - slack / 2, distance + slack / 2",
 )
-speeds.mistake("Solve v^2 / (2 mu g) = distance for v: the square root is missing.", "np.sqrt", "float")
+speeds.mistake(
+    "Solve v^2 / (2 mu g) = distance for v: the square root is missing.", "np.sqrt", "float"
+)
 speeds.mistake("Solve v^2 / (2 mu g) = distance for v: the 2 is missing.", "2 * mu", "mu")
 
 
@@ -91,14 +96,21 @@ def _track(rng, noise=0.0, most=0.3):
 
 friction.check("a clean track", _track, rtol=1e-3)
 friction.check(
-    "a track with two millimetres of jitter", lambda rng: _track(rng, 2e-3, most=0.1), rtol=1e-3, atol=1e-5
+    "a track with two millimetres of jitter",
+    lambda rng: _track(rng, 2e-3, most=0.1),
+    rtol=1e-3,
+    atol=1e-5,
 )
 friction.mistake(
-    "x = x0 + v t - (1/2) mu g t^2: the coefficient of t^2 is half the deceleration.", "-2 * np", "-np"
+    "x = x0 + v t - (1/2) mu g t^2: the coefficient of t^2 is half the deceleration.",
+    "-2 * np",
+    "-np",
 )
 friction.mistake("The track bends down: the sign of your mu is wrong.", "-2 * np", "2 * np")
 friction.mistake(
-    "Frames are dt apart: you fitted over frame numbers, not over seconds.", "dt * np.arange", "np.arange"
+    "Frames are dt apart: you fitted over frame numbers, not over seconds.",
+    "dt * np.arange",
+    "np.arange",
 )
 friction.mistake(
     "np.polyfit returns the highest power first: that of t^2 is [0].", "t, x, 2)[0]", "t, x, 2)[2]"
@@ -133,10 +145,12 @@ def _stop(rng, end, drift=0.0):
 
 
 solved.check(
-    "a puck that comes to rest at the target", lambda rng: _stop(rng, 0.94 + rng.uniform(-0.045, 0.045))
+    "a puck that comes to rest at the target",
+    lambda rng: _stop(rng, 0.94 + rng.uniform(-0.045, 0.045)),
 )
 solved.check(
-    "one that rests elsewhere", lambda rng: _stop(rng, 0.94 + rng.choice([-1, 1]) * rng.uniform(0.06, 0.2))
+    "one that rests elsewhere",
+    lambda rng: _stop(rng, 0.94 + rng.choice([-1, 1]) * rng.uniform(0.06, 0.2)),
 )
 solved.check(
     "one that slides across the target and on",

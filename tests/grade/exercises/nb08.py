@@ -21,7 +21,9 @@ def foreground(video, threshold):
 
 foreground.check("something crosses a still picture", lambda rng: (_video(rng), 20.0))
 foreground.check("another threshold", lambda rng: (_video(rng), float(rng.uniform(5, 60))))
-foreground.check("darker than the background counts as well", lambda rng: (255 - _video(rng) // 2, 15.0))
+foreground.check(
+    "darker than the background counts as well", lambda rng: (255 - _video(rng) // 2, 15.0)
+)
 foreground.mistake(
     "uint8 has no negative numbers: 10 - 20 is 246. Turn the video into floats first.",
     "video.astype(float)",
@@ -35,13 +37,19 @@ foreground.mistake(
     "np.median(video, axis=-1, keepdims=True)",
 )
 foreground.mistake(
-    "Take the median: the mean is smeared by everything that passes.", "np.median(video", "np.mean(video"
+    "Take the median: the mean is smeared by everything that passes.",
+    "np.median(video",
+    "np.mean(video",
 )
 foreground.mistake(
-    "What is darker than the background stands out, too: take the absolute difference.", "np.abs(", "("
+    "What is darker than the background stands out, too: take the absolute difference.",
+    "np.abs(",
+    "(",
 )
 foreground.mistake(
-    "One truth value a pixel: take the mean of the three colours' absolute differences.", ".mean(-1)", ""
+    "One truth value a pixel: take the mean of the three colours' absolute differences.",
+    ".mean(-1)",
+    "",
 )
 foreground.mistake(
     "Differences of opposite sign must not cancel: the absolute value first, then the mean over the colours.",
@@ -73,7 +81,9 @@ def _masked(rng):
 
 
 share_inside.check("any region", _masked, points=2)
-share_inside.check("the whole picture holds all of it", lambda rng: (_video(rng), np.ones((10, 12), bool)))
+share_inside.check(
+    "the whole picture holds all of it", lambda rng: (_video(rng), np.ones((10, 12), bool))
+)
 share_inside.mistake(
     "uint8 has no negative numbers: a pixel that gets darker by 1 counts as 255. Use floats.",
     "video.astype(float)",
@@ -86,7 +96,9 @@ share_inside.mistake(
     "np.diff(video.astype(float), axis=0)",
     "video.astype(float)",
 )
-share_inside.mistake("That is the share outside: the mask is True inside.", "energy[mask]", "energy[~mask]")
+share_inside.mistake(
+    "That is the share outside: the mask is True inside.", "energy[mask]", "energy[~mask]"
+)
 share_inside.mistake(
     "Divide by all the motion, not by the number of pixels.", "/ energy.sum()", "/ energy.size"
 )
@@ -117,11 +129,15 @@ def highest_push(radius, mu):
     return radius / mu
 
 
-highest_push.check("any mug", lambda rng: (float(rng.uniform(0.02, 0.05)), float(rng.uniform(0.1, 1))))
+highest_push.check(
+    "any mug", lambda rng: (float(rng.uniform(0.02, 0.05)), float(rng.uniform(0.1, 1)))
+)
 highest_push.check(
     "a smooth table lets you push anywhere", lambda rng: (0.03, float(rng.uniform(0.01, 0.05)))
 )
-highest_push.mistake("A rougher table makes it tip sooner: divide by mu.", "radius / mu", "radius * mu")
+highest_push.mistake(
+    "A rougher table makes it tip sooner: divide by mu.", "radius / mu", "radius * mu"
+)
 highest_push.mistake(
     "It turns about the edge of its foot, one radius from the middle, not two.",
     "radius / mu",

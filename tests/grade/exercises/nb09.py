@@ -37,7 +37,9 @@ from tests.grade.exercise import exercise
     """,
 )
 def make_drawer(client, friction):
-    shape = p.createCollisionShape(p.GEOM_BOX, halfExtents=(0.05, 0.08, 0.04), physicsClientId=client)
+    shape = p.createCollisionShape(
+        p.GEOM_BOX, halfExtents=(0.05, 0.08, 0.04), physicsClientId=client
+    )
     body = p.createMultiBody(
         baseMass=0, linkMasses=[0.8], linkCollisionShapeIndices=[shape], linkVisualShapeIndices=[-1],
         linkPositions=[(0, 0, 0)], linkOrientations=[(0, 0, 0, 1)], linkInertialFramePositions=[(0, 0, 0)],
@@ -146,7 +148,9 @@ observe.mistake(
     "(z_1 - z).ravel(), (z_2 - z_1).ravel()",
 )
 observe.mistake(
-    "The last of `recent` is the newest: z_t is recent[2].", "z_2, z_1, z = recent", "z, z_1, z_2 = recent"
+    "The last of `recent` is the newest: z_t is recent[2].",
+    "z_2, z_1, z = recent",
+    "z, z_1, z_2 = recent",
 )
 observe.mistake(
     "The second step is the one before, z_{t-1} - z_{t-2}; yours reaches from t-2 to t.",
@@ -154,7 +158,9 @@ observe.mistake(
     "(z - z_2)",
 )
 observe.mistake(
-    "The way ahead leads from the robot to the demonstration: target minus z.", "(target - z)", "(z - target)"
+    "The way ahead leads from the robot to the demonstration: target minus z.",
+    "(target - z)",
+    "(z - target)",
 )
 observe.mistake(
     "Give the way to the demonstration, not its place: or the policy has to learn the video by heart.",
@@ -171,7 +177,9 @@ observe.mistake(
     "return np.concatenate([z.ravel(), *steps, (target - z).ravel(), [clock]])",
     "return np.append(np.stack([z, z - z_1, z_1 - z_2, target - z], 1).ravel(), clock)",
 )
-observe.mistake("The clock is missing: the same z earns differently at different times.", ", [clock]", "")
+observe.mistake(
+    "The clock is missing: the same z earns differently at different times.", ", [clock]", ""
+)
 
 
 @exercise(
@@ -234,9 +242,13 @@ learn_by_watching.mistake(
     "make_reward(detect(robot), z_E)",
 )
 learn_by_watching.mistake(
-    "The pace is read from keypoints, too: detect them on the robot's frames.", "detect(robot)", "robot"
+    "The pace is read from keypoints, too: detect them on the robot's frames.",
+    "detect(robot)",
+    "robot",
 )
-learn_by_watching.mistake("Return what `train` returns: the policy.", "return train(reward)", "return reward")
+learn_by_watching.mistake(
+    "Return what `train` returns: the policy.", "return train(reward)", "return reward"
+)
 
 
 @exercise(
@@ -282,7 +294,11 @@ evaluate.mistake(
     "sum(any(play(1_000_000 + i)) for i in range(n)) / n",
 )
 evaluate.mistake("Solved at any step, not at all of them.", "any(play", "all(play")
-evaluate.mistake("Test episodes have seeds of their own: they start at 1,000,000.", "1_000_000 + i", "i")
 evaluate.mistake(
-    "You play one episode again and again: each needs a seed of its own.", "1_000_000 + i", "1_000_000"
+    "Test episodes have seeds of their own: they start at 1,000,000.", "1_000_000 + i", "i"
+)
+evaluate.mistake(
+    "You play one episode again and again: each needs a seed of its own.",
+    "1_000_000 + i",
+    "1_000_000",
 )

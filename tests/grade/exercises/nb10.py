@@ -31,7 +31,9 @@ wilson.mistake(
     "z * math.sqrt(p * (1 - p) / n)",
 )
 wilson.mistake(
-    "The root holds p (1 - p) / n and z^2 / (4 n^2): the second one has n squared.", "(4 * n**2)", "(4 * n)"
+    "The root holds p (1 - p) / n and z^2 / (4 n^2): the second one has n squared.",
+    "(4 * n**2)",
+    "(4 * n)",
 )
 wilson.mistake("Both centre and half width are divided by 1 + z^2 / n.", " / (1 + z**2 / n)", "")
 wilson.mistake(
@@ -65,13 +67,21 @@ def _luck(rng):
 chance.check("any policy, any number of episodes", _luck, points=2)
 chance.check("all of ten", lambda rng: (float(rng.uniform(0.5, 0.99)), 10, 10))
 chance.check("at least none is certain", lambda rng: (float(rng.uniform(0, 1)), 10, 0))
-chance.mistake("At least k includes k itself: start the sum there.", "range(k, n + 1)", "range(k + 1, n + 1)")
 chance.mistake(
-    "At least k means all counts from k to n; yours is exactly k.", "range(k, n + 1)", "range(k, k + 1)"
+    "At least k includes k itself: start the sum there.", "range(k, n + 1)", "range(k + 1, n + 1)"
 )
-chance.mistake("n of n belongs to it: range stops one before its end.", "range(k, n + 1)", "range(k, n)")
 chance.mistake(
-    "You sum up to k, at most k wins; at least k goes from k to n.", "range(k, n + 1)", "range(0, k + 1)"
+    "At least k means all counts from k to n; yours is exactly k.",
+    "range(k, n + 1)",
+    "range(k, k + 1)",
+)
+chance.mistake(
+    "n of n belongs to it: range stops one before its end.", "range(k, n + 1)", "range(k, n)"
+)
+chance.mistake(
+    "You sum up to k, at most k wins; at least k goes from k to n.",
+    "range(k, n + 1)",
+    "range(0, k + 1)",
 )
 chance.mistake(
     "The number of ways belongs to each count i of the sum: math.comb(n, i), not of k.",
@@ -96,7 +106,9 @@ def _seeds(rng, n=5, m=5, draws=400):
 
 difference.check("five seeds each", _seeds)
 difference.check("three seeds and four", lambda rng: _seeds(rng, 3, 4))
-difference.check("a method against itself", lambda rng: ((s := _seeds(rng))[0], s[0].copy(), s[2], s[3]))
+difference.check(
+    "a method against itself", lambda rng: ((s := _seeds(rng))[0], s[0].copy(), s[2], s[3])
+)
 difference.mistake(
     "You ask for the middle 90 %: a 95 % interval leaves out 2.5 % on each side.",
     "0.025",
@@ -159,10 +171,16 @@ verdict.check("at just one in twenty chance may stand", _twentieth)
 verdict.check("one with an expert that fails", lambda rng: (*_task(rng)[:2], np.arange(20) != 3))
 verdict.check(
     "two or three of them at once: name the first",
-    lambda rng: (np.ones(20, bool) * bool(k := rng.integers(2)), np.arange(100) < 30, np.arange(20) < 20 * k),
+    lambda rng: (
+        np.ones(20, bool) * bool(k := rng.integers(2)),
+        np.arange(100) < 30,
+        np.arange(20) < 20 * k,
+    ),
 )
 verdict.mistake(
-    "Once is enough: a task that idling solves in one episode is not fair.", "idle.any()", "idle.all()"
+    "Once is enough: a task that idling solves in one episode is not fair.",
+    "idle.any()",
+    "idle.all()",
 )
 verdict.mistake(
     "Chance may solve one episode in twenty: compare the share with 0.05.",
@@ -170,7 +188,9 @@ verdict.mistake(
     "random.any()",
 )
 verdict.mistake(
-    "The expert has to solve every episode; you are content with one.", "not expert.all()", "not expert.any()"
+    "The expert has to solve every episode; you are content with one.",
+    "not expert.all()",
+    "not expert.any()",
 )
 verdict.mistake(
     "Compare the share of the random episodes with 0.05, not their number with 5: there may be any number.",
