@@ -31,14 +31,13 @@ class ArmSpec:
 
 
 def panda() -> ArmSpec:
-    """The Franka Panda of pybullet_data, fingers fixed 3 cm apart, drawn with its low-polygon
-    meshes."""
+    """The Panda of pybullet_data, fingers fixed 3 cm apart, drawn with its low-polygon meshes."""
     folder = Path(pybullet_data.getDataPath()) / "franka_panda"
     urdf = (folder / "panda.urdf").read_text()
     # The visual meshes cost ten times the rendering time of the collision meshes.
     urdf = urdf.replace("meshes/visual", "meshes/collision").replace("package://", f"{folder}/")
-    # Fingers across the line of sight: they hold a pushed object from two sides, the camera sees
-    # one.
+    # The fingers lie across the line of sight: they hold a pushed object from two sides, and the
+    # camera sees one.
     urdf = urdf.replace('type="prismatic"', 'type="fixed"')
     for side in (1, -1):
         urdf = urdf.replace('<origin rpy="0 0 0" xyz="0 0 0.0584"/>',
@@ -128,8 +127,7 @@ def _hand() -> list[str]:
 
 
 def human() -> ArmSpec:
-    """A human-like arm: seven joints, a sleeve to the elbow, a hand with four fingers and a
-    thumb."""
+    """A human-like arm: seven joints, a sleeve to the elbow, four fingers and a thumb."""
     sleeve, cuff, forearm = (
         [_shape("mesh", (f"{name}.obj",), (0, 0, 0))] for name in ("sleeve", "cuff", "forearm")
     )

@@ -148,8 +148,7 @@ class TaskEnv(gym.Env):
         self.world.p.resetBasePositionAndOrientation(body, position, (0, 0, 0, 1))
 
     def _stand_beside(self):
-        """Put the tip low and next to the object, if it is in reach: chance brings little
-        contact."""
+        """Put the tip low and next to the object, if in reach: chance brings little contact."""
         x, low, high = self.object_position()[0], self.WORKSPACE[0][0], self.WORKSPACE[1][0]
         aside = self.np_random.uniform(self.CONTACT, self.CONTACT + 0.05)
         side = self.np_random.choice([-1, 1], p=[0.65, 0.35])

@@ -14,9 +14,11 @@ from __future__ import annotations
 
 import base64
 import html
+from collections.abc import Iterable, Sequence
 from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import cv2
 import meshcat
@@ -80,7 +82,7 @@ class Mesh(g.Geometry):
         super().__init__()
         self.corners = corners
 
-    def lower(self, object_data):
+    def lower(self, object_data: Any) -> dict[str, Any]:
         arrays = {"position": self.corners, "normal": normals(self.corners)}
         attributes = {
             k: g.pack_numpy_array(a.reshape(-1, 3).T.astype(np.float32)) for k, a in arrays.items()
@@ -134,7 +136,7 @@ def read_mesh(path: Path | str) -> np.ndarray:
     return np.array(vertices)[np.array(faces)]
 
 
-def transform(position, quaternion) -> np.ndarray:
+def transform(position: Sequence[float], quaternion: Sequence[float]) -> np.ndarray:
     """4x4 matrix of a position in m and a quaternion (x, y, z, w)."""
     T = np.eye(4)
     T[:3, :3] = np.reshape(p.getMatrixFromQuaternion(quaternion), (3, 3))
@@ -142,9 +144,8 @@ def transform(position, quaternion) -> np.ndarray:
     return T
 
 
-def drawing(kind: int, size, file: str) -> list[tuple[g.Geometry, np.ndarray]]:
-    """What draws a visual shape of `getVisualShapeData`: geometries, each with its 4x4 place in its
-    frame."""
+def drawing(kind: int, size: Sequence[float], file: str) -> list[tuple[g.Geometry, np.ndarray]]:
+    """What draws a visual shape of `getVisualShapeData`: geometries and their 4x4 places in it."""
     at = np.eye(4)
     if kind == p.GEOM_BOX:
         return [(g.Box([*size]), at)]  # full lengths
@@ -172,7 +173,7 @@ class Recorder:
     draw.
     """
 
-    def __init__(self, client: int, bodies=None):
+    def __init__(self, client: int, bodies: Iterable[int] | None = None):
         self.client, self.eye, self.target = client, EYE, TARGET  # m: where one looks from, and at
         self.world = None  # of a task's environment, whose scenery is shown for a picture only
         # an array (L, 7) each: position in m and quaternion (x, y, z, w) of every link
@@ -295,7 +296,7 @@ class Recorder:
         write_atomic(path, self.html(title, **options))
 
 
-def mirror(env) -> Recorder:
+def mirror(env: TaskEnv) -> Recorder:
     """A recorder of a task's environment, scenery included, that frames what its camera does and
     the arm."""
     env.world.show_scenery(True)
@@ -309,13 +310,13 @@ def mirror(env) -> Recorder:
     return recorder
 
 
-def pack(command) -> bytes:
+def pack(command: Any) -> bytes:
     """A meshcat command as its viewer expects it; four bytes a number hold 0.1 micrometre at 1
     m."""
     return umsgpack.packb(command.lower(), force_float_precision="single")
 
 
-def y_up(point) -> str:
+def y_up(point: Sequence[float]) -> str:
     """A point in m for the camera, whose y axis points up where ours is z: x, z, -y as
     JavaScript."""
     x, y, z = point
