@@ -35,8 +35,7 @@ def overview() -> str:
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run a command line; returns its exit code, 2 for a mistake that one sentence on stderr
-    names."""
+    """Run a command line; returns its exit code: 2 for a mistake, named in a sentence on stderr."""
     name, *rest = (sys.argv[1:] if argv is None else argv) or ["--help"]
     try:
         if name in ("-h", "--help"):

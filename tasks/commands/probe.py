@@ -102,8 +102,7 @@ def in_picture(film: np.ndarray, truth: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 
 def gap(px: np.ndarray) -> float:
-    """Mean x from tip to object over the frames (T, 4) in which the object moves by half a pixel or
-    more."""
+    """Mean x in pixels from tip to object, of the frames (T, 4) in which the object moves."""
     moving = np.abs(np.gradient(px[:, 2])) > 0.5
     return round(float((px[moving, 2] - px[moving, 0]).mean()), 2)
 

@@ -23,8 +23,7 @@ def parser() -> Parser:
 
 
 def main(argv: list[str]) -> None:
-    """Film them. Raises InputError for a mistake in the arguments, or if the expert mostly
-    fails."""
+    """Film them. Raises InputError for a mistake in the arguments, or if the expert fails often."""
     name = parser().read(argv).task
     folder = tasks.VIDEOS / name
     folder.mkdir(parents=True, exist_ok=True)

@@ -191,8 +191,7 @@ def read_settings(given: list[str], from_scratch: bool) -> dict[str, Any]:
 
 
 def prepare_folder(out: Path, settings: dict[str, Any], resume: bool) -> Path:
-    """The run's folder: the same run's if `resume`, else a new one. Raises InputError where it
-    cannot be."""
+    """The run's folder: the same run's if `resume`, else a new one, or InputError."""
     note = out / "settings.json"
     if resume:
         if not note.exists():

@@ -96,7 +96,7 @@ class Arm:
         return np.array(self.p.calculateMassMatrix(self.body, list(q)))
 
     def reset(self, tip: np.ndarray) -> None:
-        """Put the tip there (m), pointing down and at rest, by Newton steps from the rest posture."""
+        """Put the tip there (m), pointing down, at rest, by Newton steps from the rest posture."""
         q = self.home.copy()
         for _ in range(60):
             self._set(q)

@@ -158,8 +158,7 @@ class World:
         return body
 
     def sliding(self, parts: list[Part], position: Vector, axis: Vector) -> int:
-        """Add a body of fixed parts that slides along `axis` on joint 0, a rail that stands
-        fast."""
+        """Add a body of fixed parts that slides along `axis` on a rail, its joint 0."""
         first, *rest = parts
         places = [first.place, *(np.subtract(part.place, first.place) for part in rest)]
         joints = [self.p.JOINT_PRISMATIC] + [self.p.JOINT_FIXED] * len(rest)

@@ -91,8 +91,7 @@ class Mesh(g.Geometry):
 
 
 def normals(corners: np.ndarray) -> np.ndarray:
-    """Unit normals (F, 3, 3) at triangles' corners: the mean of the faces that meet there without
-    crease."""
+    """Unit normals (F, 3, 3) at triangles' corners: the mean of faces that meet there smoothly."""
     # (F, 3), length 2 x area
     face = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     unit = face / np.maximum(np.linalg.norm(face, axis=1, keepdims=True), 1e-30)
@@ -111,8 +110,7 @@ def normals(corners: np.ndarray) -> np.ndarray:
 
 
 def read_mesh(path: Path | str) -> np.ndarray:
-    """Triangles (F, 3, 3) of a Wavefront OBJ or binary STL file. Raises ValueError for any
-    other."""
+    """Triangles (F, 3, 3) of a Wavefront OBJ or binary STL file. Raises ValueError for others."""
     path = Path(path)
     if path.suffix.lower() == ".stl":
         # an 80-byte title, the count, then 50 bytes a triangle
@@ -297,8 +295,7 @@ class Recorder:
 
 
 def mirror(env: TaskEnv) -> Recorder:
-    """A recorder of a task's environment, scenery included, that frames what its camera does and
-    the arm."""
+    """A recorder of a task's environment with its scenery: the camera's view, and the arm."""
     env.world.show_scenery(True)
     recorder = Recorder(env.world.client)
     recorder.world = env.world
@@ -311,8 +308,7 @@ def mirror(env: TaskEnv) -> Recorder:
 
 
 def pack(command: Any) -> bytes:
-    """A meshcat command as its viewer expects it; four bytes a number hold 0.1 micrometre at 1
-    m."""
+    """A meshcat command as its viewer expects it; four bytes a number: 0.1 micrometre at 1 m."""
     return umsgpack.packb(command.lower(), force_float_precision="single")
 
 
