@@ -15,7 +15,7 @@ from lbw_minimal.report import COLOURS, STYLE
 from lbw_minimal.reward import MENDS
 from lbw_minimal.training import write_atomic
 from tasks.commands import Parser, table
-from tasks.commands.run import TEST_EPISODES
+from tasks.commands.job import TEST_EPISODES
 from tasks.commands.table import SEEDS, Row, each, percent, rate, read, run_missing
 
 ABLATED = ("push", "slide")

@@ -19,7 +19,7 @@ import tasks
 from lbw_minimal.report import wilson
 from lbw_minimal.training import InputError, write_atomic
 from tasks.commands import Parser, at_least, make_folder
-from tasks.commands.run import TEST_EPISODES
+from tasks.commands.job import TEST_EPISODES
 
 SEEDS = (0, 1, 2)
 PAPER = {"reach": 100, "push": 100, "slide": 80, "coffee": 70, "drawer": 80}  # %, Table II
