@@ -1,9 +1,10 @@
-"""Coffee: a mug has to be pushed under the outlet of a coffee machine, in front of a restless
-kitchen wall.
+"""Coffee: a mug has to be pushed under the outlet of a coffee machine, before a restless wall.
 
-Sizes, way, threshold and horizon follow the Meta-World coffee push task the paper builds on; the
-human's background is cluttered and moves, as in the paper. From top to bottom: constants, scene,
-success, the expert, the recipe.
+The paper's 300 steps; the rest after Meta-World's coffee-push-v2 (Farama-Foundation/Metaworld,
+commit ffe2cd37 of March 2021, metaworld/envs: mujoco/sawyer_xyz/v2/sawyer_coffee_push_v2.py,
+assets_v2/objects/assets/mug.xml; the paper names no version): the mug's size and mass, success
+within 7 cm. Friction, way and machine are ours. The human's background is cluttered and moves, as
+in the paper's Figure 4. From top to bottom: constants, scene, success, the expert, the recipe.
 """
 
 from __future__ import annotations
@@ -13,15 +14,17 @@ import numpy as np
 from lbw_minimal.imitate import Recipe
 from tasks.world import DT, FINGER, RED, SUBSTEPS, Leg, Part, TaskEnv
 
-HORIZON = 300  # control steps: 12 s
-RADIUS, HEIGHT = 0.028, 0.066  # m, of the mug
-MUG_MASS = 0.11  # kg
-MUG_FRICTION = 0.5  # times the table's 1.0: a push at half its height does not tip it
+HORIZON = 300  # control steps, 12 s: the paper's; Meta-World has had 150, 200 and 500
+RADIUS, HEIGHT = 0.028, 0.066  # m, of the mug: Meta-World's
+MUG_MASS = 0.11  # kg: Meta-World's
+MUG_FRICTION = (
+    0.5  # times the table's 1.0 (Meta-World: 1.0): a push at half its height does not tip it
+)
 HANDLE = (0.020, 0.008, 0.036)  # m: how far it stands out, its thickness, its height
 MUG_START = 0.51  # m, along x
-OUTLET = 0.69  # m, along x: 18 cm further
+OUTLET = 0.69  # m, along x: 18 cm further; Meta-World has 15 to 25 cm
 SCATTER = (0.49, 0.69)  # m, where random data puts the mug
-SUCCESS = 0.07  # m, distance from mug to outlet
+SUCCESS = 0.07  # m, distance from mug to outlet: Meta-World's
 HEAD, COLUMN = (0.10, 0.19), 0.755  # m: the machine's head from and to, the column's x
 MACHINE, METAL = (0.16, 0.20, 0.26, 1), (0.48, 0.50, 0.52, 1)
 WALL = 0.28  # m along y, the tiles of the human's kitchen

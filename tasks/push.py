@@ -1,7 +1,9 @@
 """Push: a cube lies on the table, and its centre has to end at the target 15 cm further on.
 
-Success, horizon and sizes follow the Fetch push task the paper builds on; the cube is red as in the
-paper's Figure 5. From top to bottom: constants, scene, success, the expert, the recipe.
+After the paper's FetchPush (openai/gym 0.18.0, gym/envs/robotics: fetch/push.py,
+assets/fetch/push.xml): the cube's size, success within 5 cm, 50 steps. Its mass, its friction and
+its way are ours. The paper says puck, and shows a red cube in its Figure 5: so ours is red. From
+top to bottom: constants, scene, success, the expert, the recipe.
 """
 
 from __future__ import annotations
@@ -11,14 +13,14 @@ import numpy as np
 from lbw_minimal.imitate import Recipe
 from tasks.world import FINGER, GREEN, RED, Leg, TaskEnv
 
-HORIZON = 50  # control steps: 2 s
-CUBE = 0.05  # m, edge
-CUBE_MASS = 0.4  # kg; a 0.2 kg cube shoots away when it is pinched from above
-CUBE_FRICTION = 0.6  # at 1.0 a push at half its height tips it over
+HORIZON = 50  # control steps, 2 s: the paper's and Fetch's
+CUBE = 0.05  # m, edge: Fetch's
+CUBE_MASS = 0.4  # kg (Fetch: 2); a 0.2 kg cube shoots away when it is pinched from above
+CUBE_FRICTION = 0.6  # (Fetch: 1.0); at 1.0 a push at half its height tips it over
 CUBE_START = 0.53  # m, along x
-TARGET = 0.68  # m, along x: 15 cm further
+TARGET = 0.68  # m, along x: 15 cm further; Fetch draws start and target, 17 cm apart in the mean
 SCATTER = (0.50, 0.70)  # m, where random data puts the cube
-SUCCESS = 0.05  # m, distance from cube to target
+SUCCESS = 0.05  # m, distance from cube to target: Fetch's `distance_threshold`
 
 
 class Push(TaskEnv):

@@ -1,7 +1,8 @@
 """Reach: a target hangs over the table, and the tip of the arm has to come within 5 cm of it.
 
-Success and horizon follow the Fetch reach task the paper builds on. From top to bottom: constants,
-scene, success, the expert, the recipe.
+After the paper's FetchReach (openai/gym 0.18.0, gym/envs/robotics/fetch/reach.py): success within
+5 cm, in 50 steps of 1/25 s. Where the target hangs is ours. From top to bottom: constants, scene,
+success, the expert, the recipe.
 """
 
 from __future__ import annotations
@@ -11,10 +12,10 @@ import numpy as np
 from lbw_minimal.imitate import Recipe
 from tasks.world import GREEN, Leg, TaskEnv
 
-HORIZON = 50  # control steps: 2 s
+HORIZON = 50  # control steps, 2 s: the paper's and Fetch's
 RADIUS = 0.018  # m, the ball that marks the target; it cannot be touched
 TARGET = (0.68, 0.0, 0.06)  # m
-SUCCESS = 0.05  # m, distance from tip to target
+SUCCESS = 0.05  # m, distance from tip to target: Fetch's `distance_threshold`
 
 
 class Reach(TaskEnv):

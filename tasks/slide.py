@@ -1,8 +1,10 @@
-"""Slide: a puck on a slippery table has to come to rest at a target that no arm reaches: a hit,
-well dosed.
+"""Slide: a puck on a slippery table has to come to rest at a target that no arm reaches.
 
-Sizes, friction, distance and horizon follow the Fetch slide task the paper builds on. From top to
-bottom: constants, scene, success, the expert, the recipe.
+The paper's words and its 300 steps; the rest after FetchSlide (openai/gym 0.18.0,
+gym/envs/robotics: fetch/slide.py, assets/fetch/slide.xml): the puck's size, its friction, success
+within 5 cm. Fetch gives it 50 steps and counts a puck that slides through; that it has to rest is
+the paper's, how slow that is, ours. From top to bottom: constants, scene, success, the expert, the
+recipe.
 """
 
 from __future__ import annotations
@@ -12,15 +14,19 @@ import numpy as np
 from lbw_minimal.imitate import Recipe
 from tasks.world import FINGER, GREEN, RED, Leg, TaskEnv
 
-HORIZON = 300  # control steps: 12 s
-RADIUS, HEIGHT = 0.025, 0.04  # m, of the puck
-PUCK_MASS = 0.4  # kg
-PUCK_FRICTION = 0.1  # times the table's 1.0: a puck of speed v slides v^2 / (2 * 0.1 * 9.81)
+HORIZON = 300  # control steps, 12 s: the paper's; Fetch has 50
+RADIUS, HEIGHT = 0.025, 0.04  # m, of the puck: Fetch's
+PUCK_MASS = (
+    0.4  # Fetch's 0.1; times the table's 1.0. A puck of speed v slides v^2 / (2 * 0.1 * 9.81).
+)
+PUCK_FRICTION = 0.1
 PUCK_START = 0.53  # m, along x
-TARGET = 0.94  # m, along x: 41 cm further, which asks for 0.90 m/s
+# m, along x: 41 cm further, which asks for 0.90 m/s. Fetch draws it about 40 cm ahead of the
+# gripper.
+TARGET = 0.94
 SCATTER = (0.50, 1.02)  # m, where random data puts the puck
-SUCCESS = 0.05  # m, distance from puck to target
-AT_REST = 0.02  # m/s, and slower than this
+SUCCESS = 0.05  # m, distance from puck to target: Fetch's `distance_threshold`
+AT_REST = 0.02  # m/s, and slower than this: ours
 STROKE, STROKE_TIME = 0.174, 0.40  # m, s: the expert's hit
 
 

@@ -10,6 +10,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import tasks
+from tasks.drawer import SHUT
 from tasks.world import RED, Leg, TaskEnv, expert_actions, record_random
 
 IDS = [f"LbW-{name.capitalize()}-v0" for name in tasks.TASKS]
@@ -70,6 +71,11 @@ def test_a_puck_kicked_at_1_m_s_slides_as_coulomb_says():
     # 0.510 m
     assert env.object_position()[0] - 0.75 == pytest.approx(1 / (2 * 0.1 * 9.81), rel=0.01)
     env.close()
+
+
+def test_drawer_is_shut_where_meta_world_says():
+    """6.5 cm between two points that are q - 0.01 apart along the rail and 5 cm in height."""
+    assert pytest.approx(0.01 - (0.065**2 - 0.05**2) ** 0.5, abs=5e-5) == SHUT
 
 
 def test_the_drawer_stays_where_nobody_pushes():

@@ -1,9 +1,10 @@
-"""The Operational Space Controller that moves both arms (Khatib 1987).
+"""The Operational Space Controller that moves both arms.
 
 In: a goal for the arm's tip, position in metres and orientation. Out: joint torques that make the
 tip behave like a critically damped mass on springs, in all six directions alike, whatever the arm's
 pose:
     tau = J^T Lambda (kp e - kd v) + h + N^T M (posture),    Lambda = (J M^-1 J^T)^-1
+After Khatib 1987, IEEE J. Robotics and Automation 3(1), 43-53; kp and the posture are ours.
 """
 
 from __future__ import annotations

@@ -50,7 +50,7 @@ def panda() -> ArmSpec:
         base=(0.0, 0.0, 0.0),
         home=(0.0, 0.10, 0.0, -2.45, 0.0, 2.55, 0.785),
         down=((1, 0, 0), (0, -1, 0), (0, 0, -1)),
-        effort=(87, 87, 87, 87, 12, 12, 12),
+        effort=(87, 87, 87, 87, 12, 12, 12),  # panda.urdf's, which are the real arm's
         reach_links=("panda_hand", "panda_leftfinger", "panda_rightfinger"),
         # One colour: patches of an arm in two tones tempt the translation to paint them anywhere.
         colours={f"panda_{name}": WHITE for name in parts},

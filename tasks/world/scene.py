@@ -44,7 +44,7 @@ SIZE = 84  # pixels, both sides of every frame
 SUPERSAMPLE = 2
 DT = 1 / 250  # s, one simulation step
 SUBSTEPS = 10  # simulation steps per control step
-FPS = 25  # control steps and frames per second: 1 / (DT * SUBSTEPS)
+FPS = 25  # control steps and frames per second, as in Fetch: 1 / (DT * SUBSTEPS)
 TABLE_FRICTION = 1.0  # Bullet multiplies it with the object's own
 # m, half the thickness of gripper and fingers: a tip that pushes a thing stands this far behind it.
 FINGER = 0.012
