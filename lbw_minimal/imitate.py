@@ -19,8 +19,8 @@ import torch
 from gymnasium.wrappers import TimeLimit
 
 from lbw_minimal import munit, sac, transporter
-from lbw_minimal.reward import KeypointReward
-from lbw_minimal.training import Checkpoint, write_atomic
+from lbw_minimal.reward import KeypointReward, LiteralReward, MendedReward
+from lbw_minimal.training import Checkpoint, InputError, write_atomic
 from lbw_minimal.wrappers import KeypointObservation, KeypointRewardWrapper
 
 # frames of random robot motion that show its pace; so few are filmed again in a second or two,
@@ -131,17 +131,36 @@ def learn_perception(demo, random, robot, recipe, *, task, seed, run, device="cp
     return Perception(T, style, transporter.load(path, task))
 
 
-def watched(env, perception: Perception, robot, form="mended", without=None):
-    """`env` as the paper's agent sees it, observing keypoints and earning r_t, and its
-    `KeypointReward`.
+def make_reward(
+    perception: Perception,
+    robot: np.ndarray,
+    form: str = "mended",
+    *,
+    without: str | None = None,
+    horizon: int | None = None,
+) -> KeypointReward:
+    """r_t for the demonstration that `perception` has watched.
 
-    Long after the demonstration's end nothing is left to do: episodes are shorter than a long
-    horizon. `perception` has watched the demonstration; the other arguments are those of `imitate`.
+    robot (M, 84, 84, 3) uint8: random robot motion. form: "literal" or "mended"; without: one of
+    `MENDS` to leave out. horizon: the most steps an episode may have.
     """
+    if form == "literal":
+        return LiteralReward(perception.z_E)
+    if form != "mended":
+        raise InputError(f"reward form {form!r}: choose 'literal' or 'mended'.")
     switches = {without: False} if without else {}
-    horizon = env.spec.max_episode_steps
     z_robot = perception.detect(robot[:PACE])
-    reward = KeypointReward(perception.z_E, z_robot, form=form, horizon=horizon, **switches)
+    return MendedReward(perception.z_E, z_robot, horizon=horizon, **switches)
+
+
+def watched(env, perception: Perception, robot, form="mended", without=None):
+    """`env` as the paper's agent sees it, observing keypoints and earning r_t, and that reward.
+
+    An episode ends some time after the demonstration does, even if the horizon is longer: nothing
+    is left to do then. The other arguments are those of `make_reward`.
+    """
+    horizon = env.spec.max_episode_steps
+    reward = make_reward(perception, robot, form, without=without, horizon=horizon)
     env = KeypointRewardWrapper(KeypointObservation(env, perception.detect), reward)
     return TimeLimit(env, min(horizon, reward.episode)), reward
 

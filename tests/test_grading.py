@@ -94,12 +94,12 @@ BAD = {
     "reads the checks": (f"got = open({str(ROOT / 'tests' / 'test_grading.py')!r}).read()\n" + NEEDS, 0),
     "opens a socket": ("import socket\ngot = socket.socket()\n" + NEEDS, 0),
     "imports the answer": (
-        "from lbw_minimal.reward import KeypointReward\n"
-        "def r1(z, z_E):\n    return KeypointReward(z_E, form='literal')(z, z)[1]['r1']",
+        "from lbw_minimal.reward import LiteralReward\n"
+        "def r1(z, z_E):\n    return LiteralReward(z_E)(z, z)[1]['r1']",
         0,
     ),
     "imports when called": (
-        "def r1(z, z_E):\n    from lbw_minimal.reward import KeypointReward\n    return 0.0", 0,
+        "def r1(z, z_E):\n    from lbw_minimal.reward import LiteralReward\n    return 0.0", 0,
     ),
     "starts a program": ("import subprocess\ngot = subprocess.run(['ls'])\n" + NEEDS, 0),
     "forges the channel": (

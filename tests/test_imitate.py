@@ -1,8 +1,17 @@
 """The method as a whole, on data too small to learn anything from."""
 
 import numpy as np
+import pytest
 
-from lbw_minimal.imitate import Recipe, Run, learn_perception, load_perception
+from lbw_minimal.imitate import (
+    Perception,
+    Recipe,
+    Run,
+    learn_perception,
+    load_perception,
+    make_reward,
+)
+from lbw_minimal.training import InputError
 
 TINY = Recipe(
     human_frames=6, robot_frames=6, munit_iterations=1, munit_width=4, transporter_iterations=1
@@ -31,3 +40,22 @@ def test_a_finished_stage_is_loaded_and_not_trained_again(tmp_path):
         np.testing.assert_array_equal(other.detect(frames(3)), first.detect(frames(3)))
     assert set(Run(tmp_path).metrics["stages"]) == {"translation", "keypoints"}
     assert not list(tmp_path.glob("*.checkpoint"))
+
+
+@pytest.fixture(scope="module")
+def watcher():
+    """Perception whose detector is a formula, after a demonstration in which everything moves."""
+    way = np.cumsum(np.random.default_rng(0).normal(size=(30, 2, 2)) * 0.03, axis=0)
+    perception = Perception(None, None, None, z_E=way)
+    perception.detect = lambda frames: np.cumsum(np.full((len(frames), 2, 2), 0.02), axis=0)
+    return perception
+
+
+def test_a_form_of_reward_that_does_not_exist_is_refused(watcher):
+    with pytest.raises(InputError, match="reward form 'sparse': choose 'literal' or 'mended'"):
+        make_reward(watcher, frames(6), "sparse")
+
+
+def test_one_mend_is_left_out_and_the_others_stay(watcher):
+    late, early = (make_reward(watcher, frames(6), without=m) for m in ("timed", "include_goal"))
+    assert not late.timed and early.timed and late.last == early.last + 1

@@ -10,7 +10,8 @@ from toy_push import HALF_GRIPPER, HALF_PUCK, ToyPush, demonstration, detect, fo
 from lbw_minimal.reward import (
     LAMBDA,
     MENDS,
-    KeypointReward,
+    LiteralReward,
+    MendedReward,
     resample,
     trim_pauses,
 )
@@ -41,7 +42,7 @@ def toy():
 
 
 def mended(toy, **switches):
-    return KeypointReward(*toy, horizon=HORIZON, **switches)
+    return MendedReward(*toy, horizon=HORIZON, **switches)
 
 
 def episode(z):
@@ -65,37 +66,42 @@ def replay(toy):
 
 
 def test_eq_9_is_the_distance_to_the_nearest_frame_and_looks_at_z_t():
-    reward = KeypointReward(line(0, 1, 3), form="literal")
+    reward = LiteralReward(line(0, 1, 3))
     assert reward(line(0.8)[0], line(5)[0])[1]["r1"] == pytest.approx(-0.2)
 
 
 def test_eq_9_leaves_the_goal_frame_out():
-    reward = KeypointReward(line(0, 1, 3), form="literal")
+    reward = LiteralReward(line(0, 1, 3))
     # p <= N - 1: nearest is x = 1
     assert reward(line(3)[0], line(3)[0])[1]["r1"] == pytest.approx(-2)
 
 
 def test_eq_10_is_the_distance_to_the_nearest_step_wherever_it_was_made():
-    reward = KeypointReward(line(0, 1, 3), form="literal")  # steps 1 and 2
+    reward = LiteralReward(line(0, 1, 3))  # steps 1 and 2
     assert reward(line(0)[0], line(1.7)[0])[1]["r2"] == pytest.approx(-0.3)
 
 
 def test_norms_run_over_all_keypoints_at_once():
-    reward = KeypointReward(np.zeros((3, 2, 2)), form="literal")
+    reward = LiteralReward(np.zeros((3, 2, 2)))
     z = np.array([[3.0, 0.0], [0.0, 4.0]])
     assert reward(z, z)[1] == {"r1": pytest.approx(-5), "r2": 0}
 
 
 def test_eq_8_weighs_the_parts_by_lambda():
-    reward = KeypointReward(line(0, 1, 3), form="literal", lam=(2, 10))
+    reward = LiteralReward(line(0, 1, 3), lam=(2, 10))
     r, parts = reward(line(0.8)[0], line(2.5)[0])
     assert r == pytest.approx(2 * parts["r1"] + 10 * parts["r2"]) == pytest.approx(-0.4 - 3)
+
+
+def test_literal_reward_knows_no_time():
+    reward = LiteralReward(line(0, 1, 3))
+    assert reward(line(0.8)[0], line(2)[0], 0) == reward(line(0.8)[0], line(2)[0], 99)
 
 
 def test_idle_agent_wins_under_the_literal_reward(toy):
     """The trap: the demonstration starts at the robot's pose and pauses, so standing still is
     perfect."""
-    literal = KeypointReward(toy[0], form="literal")
+    literal = LiteralReward(toy[0])
     idle = np.repeat(toy[0][:1], HORIZON + 1, axis=0)
     assert total(literal, idle) == 0 >= total(literal, episode(toy[0]))
 
@@ -114,7 +120,7 @@ def test_arm_that_never_touches_the_object_scores_below_the_replay(toy):
     reward, touchless = mended(toy), replay(toy).copy()
     touchless[:, 3] = touchless[0, 3]
     share = np.linalg.norm(reward.z_E[-1, 3] - reward.z_E[0, 3]) / 4 / reward.path
-    lost = share * (HORIZON - len(reward))
+    lost = share * (HORIZON - len(reward.z_E))
     assert lost > 2
     assert total(reward, touchless) < total(reward, replay(toy)) - lost
 
@@ -132,7 +138,7 @@ def test_following_exactly_earns_nothing_less_than_zero(toy):
 
 def test_idle_agent_seen_at_the_end_is_the_unit_of_r1():
     z = line(0, 0.1, 0.2, 0.3, 0.4, 0.5)
-    reward = KeypointReward(z, random_walk(1))
+    reward = MendedReward(z, random_walk(1))
     assert reward(z[0], z[0], t=100)[1]["r1"] == pytest.approx(-1)
 
 
@@ -211,7 +217,7 @@ def test_resampling_keeps_a_strike_faster_than_its_approach():
 
 def test_a_long_demonstration_leaves_time_to_reach_its_goal(toy):
     slow = np.repeat(toy[0], 10, axis=0) + np.linspace(0, 0.5, 10 * len(toy[0]))[:, None, None]
-    assert len(mended((slow, toy[1]), trim=False)) <= 0.7 * HORIZON
+    assert len(mended((slow, toy[1]), trim=False).z_E) <= 0.7 * HORIZON
 
 
 # What comes in wrong ------------------------------------------------------------------------------
@@ -227,6 +233,12 @@ def test_a_long_demonstration_leaves_time_to_reach_its_goal(toy):
         ((line(1, 1, 1, 1), random_walk(1)), "nothing moves"),
     ],
 )
-def test_wrong_input_is_refused_in_a_sentence(arguments, message):
+def test_wrong_input_of_the_mended_reward_is_refused_in_a_sentence(arguments, message):
     with pytest.raises(InputError, match=message):
-        KeypointReward(*arguments)
+        MendedReward(*arguments)
+
+
+@pytest.mark.parametrize("z_E", [np.zeros((5, 2)), np.zeros((2, 1, 2)), np.zeros((5, 1, 3))])
+def test_a_trajectory_of_another_shape_is_refused_by_the_literal_reward(z_E):
+    with pytest.raises(InputError, match="shape"):
+        LiteralReward(z_E)

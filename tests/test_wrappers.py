@@ -8,7 +8,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 from toy_push import ToyPush, demonstration, detect, random_frames
 
-from lbw_minimal.reward import KeypointReward
+from lbw_minimal.reward import LiteralReward, MendedReward
 from lbw_minimal.sac import train
 from lbw_minimal.wrappers import KeypointObservation, KeypointRewardWrapper
 
@@ -17,9 +17,15 @@ K = 4
 
 @pytest.fixture(scope="module", params=["mended", "literal"])
 def reward(request):
-    return KeypointReward(
-        detect(demonstration()), detect(random_frames(300)), horizon=50, form=request.param
-    )
+    return LiteralReward(z_E()) if request.param == "literal" else timed()
+
+
+def z_E():
+    return detect(demonstration())
+
+
+def timed():
+    return MendedReward(z_E(), detect(random_frames(300)), horizon=50)
 
 
 def wrap(env, reward):
@@ -119,7 +125,7 @@ def test_literal_policy_sees_keypoints_alone(reward):
 
 
 def test_timed_observation_tells_the_way_to_the_demonstration_and_the_clock():
-    reward = KeypointReward(detect(demonstration()), detect(random_frames(300)), horizon=50)
+    reward = timed()
     env = wrap(Film(demonstration()), reward)
     observations, _ = play(env, 3)
     z, moved, before, way, clock = np.split(observations[2], [2 * K, 4 * K, 6 * K, 8 * K])
@@ -127,12 +133,11 @@ def test_timed_observation_tells_the_way_to_the_demonstration_and_the_clock():
     np.testing.assert_array_equal(before, observations[1][2 * K : 4 * K])
     assert not observations[0][2 * K : 6 * K].any()  # nothing has moved at the start
     assert (z + way).reshape(K, 2) == pytest.approx(reward.z_E[3], abs=1e-6)
-    assert clock[0] == pytest.approx(2 / (len(reward) - 1))
+    assert clock[0] == pytest.approx(2 / (len(reward.z_E) - 1))
 
 
 def test_the_clock_starts_again_with_every_episode():
-    reward = KeypointReward(detect(demonstration()), detect(random_frames(300)), horizon=50)
-    env = wrap(ToyPush(), reward)
+    env = wrap(ToyPush(), timed())
     first, second = play(env)[1], play(env)[1]
     assert (first == second).all()
 
