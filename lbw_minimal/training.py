@@ -10,7 +10,10 @@ import json
 import os
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import torch
@@ -99,6 +102,11 @@ def load_state(path: Path | str) -> dict:
     return _unflatten(tree, tensors)
 
 
+def _state_of(thing):
+    is_generator = isinstance(thing, np.random.Generator)
+    return thing.bit_generator.state if is_generator else thing.state_dict()
+
+
 class Checkpoint:
     """One training's state on disk, saved at most every `seconds`, so that a kill costs no more.
 
@@ -124,7 +132,36 @@ class Checkpoint:
         self._start -= saved["spent"]
         return saved["state"]
 
-    def save(self, make_state, force: bool = False) -> None:
+    def resume(
+        self, stateful: dict[str, Any], **variables: Any
+    ) -> tuple[SimpleNamespace, Callable[[], dict]]:
+        """Take a training up where it was: the loop's variables now, and the state for `save`.
+
+        stateful: networks and optimizers by name, all that have `state_dict` and `load_state_dict`,
+        and NumPy generators. They are set to the saved state in place. variables: what the loop
+        changes, with values for a new start; a checkpoint must be able to hold them.
+
+            now, state = checkpoint.resume({"model": model, "adam": adam, "rng": rng}, step=0, log=[])
+            while now.step < iterations:
+                ...
+                now.step += 1
+                checkpoint.save(state)
+        """
+        now = SimpleNamespace(**variables)
+        if saved := self.load():
+            for name, thing in stateful.items():
+                if isinstance(thing, np.random.Generator):
+                    thing.bit_generator.state = saved[name]
+                else:
+                    thing.load_state_dict(saved[name])
+            vars(now).update({name: saved[name] for name in variables})
+
+        def state():
+            return {name: _state_of(thing) for name, thing in stateful.items()} | vars(now)
+
+        return now, state
+
+    def save(self, make_state: Callable[[], dict], force: bool = False) -> None:
         """Call `make_state()` and save it, if `seconds` have passed or `force` asks for it."""
         if self.path is None or not (force or time.monotonic() - self._last > self.seconds):
             return

@@ -1,10 +1,12 @@
-"""Transporter (Sec. III-B of the paper): keypoints without labels, from what moves between two
-frames.
+"""Transporter (Sec. III-B of the paper): keypoints without labels, from what moves between frames.
 
 Eq. 6 rebuilds frame y from the features of frame x, cut out and pasted at K points; Eq. 7 compares.
 Only what stands under a keypoint can change its place, so the points settle on arm and object.
 In: videos (T, 84, 84, 3) uint8 of the robot and of the translated human. Out: keypoints z (T, K, 2)
 in [-1, 1], x right and y down; (z + 1) * 42 - 0.5 is the pixel.
+
+The comments on the constants say what other values did while the kit was built. No results file
+holds those runs; notebook 5 repeats some of them.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ import torch
 import torch.nn.functional as F
 from torch import nn
 
+from lbw_minimal.images import median_frame, motion_weight, to_images
 from lbw_minimal.training import (
     Checkpoint,
     InputError,
@@ -27,23 +30,24 @@ from lbw_minimal.training import (
 )
 
 SIGMA = 0.1  # width of a keypoint's Gaussian in units of z: one cell of the 21 x 21 map
-# a keypoint must first feel the object from afar: at 0.1 the arm takes all of them
+# A keypoint must first feel the object from afar: if it starts at 0.1, the arm takes all of them.
 SIGMA_START = 0.3
-SPREAD = 0.06  # weight of `crowding`; at 0 one thing may take all K, at 0.3 some stay on the wall
 GAIN = 3.0  # of the logits: at 1 a peak of 6 among 441 cells is read as half-way to the centre
-# weight of `identity`; at 0 two keypoints may share arm and object as "left" and "right one"
-LOOK = 0.02
-GAP = 20  # frames between the two of a pair; further apart is as good as drawn freely
-# share of pairs drawn freely: within GAP frames the object has moved in only 4 of 10 pairs
-ACROSS = 0.5
+CROWDING_WEIGHT = 0.06  # at 0 one thing may take all K keypoints, at 0.3 some stay on the wall
+# At 0 two keypoints may share arm and object as "the left one" and "the right one".
+IDENTITY_WEIGHT = 0.02
+PAIR_GAP = 20  # most frames between the two of a pair; further apart is as good as drawn freely
+# Of the pairs, drawn freely. Within PAIR_GAP frames the object has moved in only 4 of 10 pairs.
+FREE_SHARE = 0.5
 MOTION = 10.0  # weight of what differs from the median frame, see `motion_weight`
 LEARNING_RATE = 2e-3  # falls to 0 along a cosine
 BATCH = 32
+LOG_EVERY = 50  # steps
 
 
 def _block(c_in, c_out, kernel, stride):
-    # Even kernels at stride 2 keep cell i centred on pixel 4i + 1.5. Groups of one channel are
-    # instance norm.
+    # Even kernels at stride 2 keep cell i of the map centred on pixel 4i + 1.5. Group norm with one
+    # channel a group is instance norm.
     conv = nn.Conv2d(c_in, c_out, kernel, stride, (kernel - 1) // 2, bias=False)
     return nn.Sequential(conv, nn.GroupNorm(c_out, c_out), nn.ReLU(inplace=True))
 
@@ -62,10 +66,9 @@ def _cells(n, like):
 
 
 def soft_argmax(logits: torch.Tensor) -> torch.Tensor:
-    """Keypoints (B, K, 2) of logits (B, K, h, w): the mean position under the softmax over the
-    whole map.
+    """Keypoints (B, K, 2) of logits (B, K, h, w): the mean position under the map's softmax.
 
-    Kulkarni et al. take a softmax of each marginal. Then x may come from the arm and y from the
+    Kulkarni et al. take a softmax of each marginal; there x may come from the arm and y from the
     object.
     """
     p = (GAIN * logits.flatten(2)).softmax(-1).view(logits.shape)
@@ -80,8 +83,7 @@ def _bumps(z, sigma, size):
 
 
 def heat_map(z: torch.Tensor, sigma: float = SIGMA, size: int = 21) -> torch.Tensor:
-    """H (B, 1, size, size) in [0, 1] of keypoints z (B, K, 2), each a Gaussian exp(-d^2 /
-    sigma^2)."""
+    """H (B, 1, size, size) in [0, 1] of keypoints z (B, K, 2), Gaussians exp(-d^2 / sigma^2)."""
     g = _bumps(z, sigma, size)
     h = g[:, :, 1, :, None] * g[:, :, 0, None, :]  # (B, K, size, size)
     return 1 - (1 - h).prod(1, keepdim=True)  # a sum would exceed 1 where keypoints meet
@@ -90,8 +92,7 @@ def heat_map(z: torch.Tensor, sigma: float = SIGMA, size: int = 21) -> torch.Ten
 def transport(
     phi_x: torch.Tensor, phi_y: torch.Tensor, h_x: torch.Tensor, h_y: torch.Tensor
 ) -> torch.Tensor:
-    """Eq. 6: the features of x without what stands at either frame's keypoints, and with y's at
-    y's.
+    """Eq. 6: the features of x, cut out at both frames' keypoints, with y's pasted at y's.
 
     phi (B, C, h, w), h (B, 1, h, w) in [0, 1]. Nothing is learnt through the source x, as in
     Kulkarni et al. (2019).
@@ -100,47 +101,40 @@ def transport(
     return (1 - h_x) * (1 - h_y) * phi_x + h_y * phi_y
 
 
-def motion_weight(y: torch.Tensor, median: torch.Tensor) -> torch.Tensor:
-    """Weight (B, 1, H, W) >= 1 of each pixel of y (B, 3, H, W): 1 + MOTION * distance from the
-    median frame.
-
-    Not in the paper. A small object is 1 % of the frame; unweighted, the loss can do without it.
-    """
-    return 1 + MOTION * (y - median).abs().mean(1, keepdim=True)
-
-
 def loss(y_hat: torch.Tensor, y: torch.Tensor, weight: torch.Tensor | float = 1.0) -> torch.Tensor:
-    """Eq. 7, squared as in Kulkarni et al. (2019): a missing object costs more than a blurred
-    edge."""
+    """Eq. 7, squared as in Kulkarni et al. (2019).
+
+    Squares make a missing object cost more than a blurred edge.
+    """
     return (weight * (y_hat - y) ** 2).mean()
 
 
 def crowding(z: torch.Tensor, sigma: float) -> torch.Tensor:
-    """Mean overlap in [0, 1) of the Gaussians of different keypoints z (B, K, 2). Not in the
-    paper."""
+    """Mean overlap in [0, 1) of the Gaussians of different keypoints z (B, K, 2).
+
+    Not in the paper. It keeps two keypoints from following the same spot.
+    """
     d2 = ((z[:, :, None] - z[:, None]) ** 2).sum(-1)  # (B, K, K)
     K = z.shape[1]
-    # less the K with themselves
+    # minus K, because each overlaps with itself
     return (torch.exp(-d2 / (2 * sigma**2)).sum((1, 2)) - K).mean() / K**2
 
 
 def identity(z: torch.Tensor, y: torch.Tensor) -> torch.Tensor:
-    """Variance over the batch of the mean colour under each keypoint z (B, K, 2) of y (B, 3, 84,
-    84).
+    """Variance over the batch of the mean colour of y (B, 3, 84, 84) under each z (B, K, 2).
 
     Not in the paper. A keypoint has to be the same thing in every frame, and a thing keeps its
     colour.
     """
     g = _bumps(z, SIGMA, 21)
     g = g / g.sum(-1, keepdim=True)
-    # (B, K, 3)
-    colour = torch.einsum("bkh,bkw,bchw->bkc", g[:, :, 1], g[:, :, 0], F.avg_pool2d(y, 4))
+    small = F.avg_pool2d(y, 4)  # (B, 3, 21, 21)
+    colour = torch.einsum("bkh,bkw,bchw->bkc", g[:, :, 1], g[:, :, 0], small)  # (B, K, 3)
     return colour.var(0).sum(-1).mean()
 
 
 class Transporter(nn.Module):
-    """Feature encoder Phi, keypoint detector Psi and refiner R for frames (B, 3, 84, 84) in [-1,
-    1]."""
+    """Feature encoder Phi, keypoint detector Psi and refiner R, for images (B, 3, 84, 84)."""
 
     def __init__(self, K: int = 5):
         super().__init__()
@@ -158,23 +152,25 @@ class Transporter(nn.Module):
         """z (B, K, 2) in [-1, 1], x right and y down, of images (B, 3, 84, 84) in [-1, 1]."""
         return soft_argmax(self.psi(images))
 
-    def forward(self, x, y, y_seen=None, sigma: float = SIGMA):
-        """y rebuilt from x, (B, 3, 84, 84), and y's z (B, K, 2); `y_seen` is what the detector sees
-        of y."""
-        # `transport` would stop the gradient anyway; this also saves its cost
-        with torch.no_grad():
+    def forward(
+        self,
+        x: torch.Tensor,
+        y: torch.Tensor,
+        y_seen: torch.Tensor | None = None,
+        sigma: float = SIGMA,
+    ) -> tuple[torch.Tensor, torch.Tensor]:
+        """y rebuilt from x, (B, 3, 84, 84), and y's keypoints (B, K, 2).
+
+        The detector looks at `y_seen` in place of y, if it is given.
+        """
+        with torch.no_grad():  # `transport` would stop the gradient anyway; this saves its cost
             phi_x, h_x = self.phi(x), heat_map(self.keypoints(x), sigma)
         z_y = self.keypoints(y if y_seen is None else y_seen)
         return self.refiner(transport(phi_x, self.phi(y), h_x, heat_map(z_y, sigma))), z_y
 
 
-def _to_network(frames):
-    return frames.permute(0, 3, 1, 2).contiguous().float() / 127.5 - 1  # (B, 3, 84, 84) in [-1, 1]
-
-
 def _augment(y):
-    """y as a poor camera or an imperfect translation would show it; nothing moves, z must not
-    change.
+    """y as a poor camera or an imperfect translation would show it. Nothing moves, so z must stay.
 
     Drawn on the CPU, whose random state is in the checkpoint.
     """
@@ -187,14 +183,30 @@ def _augment(y):
 
 
 def _draw_pairs(lengths, n, rng):
-    """Indices (n,), (n,) of source and target into the joined videos; every video is target equally
-    often."""
+    """Indices (n,) of sources and (n,) of targets into the joined videos.
+
+    Every video is target equally often.
+    """
     ends = np.cumsum(lengths)
     starts = ends - lengths
     video = rng.integers(len(lengths), size=n)
     y = rng.integers(starts[video], ends[video])
-    x = np.clip(y + rng.integers(-GAP, GAP + 1, n), starts[video], ends[video] - 1)
-    return np.where(rng.random(n) < ACROSS, rng.integers(ends[-1], size=n), x), y
+    x = np.clip(y + rng.integers(-PAIR_GAP, PAIR_GAP + 1, n), starts[video], ends[video] - 1)
+    return np.where(rng.random(n) < FREE_SHARE, rng.integers(ends[-1], size=n), x), y
+
+
+def _update(model, optimizer, x, y, median, early) -> dict:
+    """One step on pairs of images x, y (B, 3, 84, 84); `early` falls from 1 to 0. A row of the log."""
+    sigma = SIGMA + (SIGMA_START - SIGMA) * early
+    y_hat, z_y = model(x, y, _augment(y), sigma)
+    error = loss(y_hat, y, motion_weight(y, median, MOTION))
+    apart = CROWDING_WEIGHT * early * crowding(z_y, sigma)
+    same = IDENTITY_WEIGHT * (1 - early) * identity(z_y, y)
+    optimizer.zero_grad()
+    (error + apart + same).backward()
+    nn.utils.clip_grad_norm_(model.parameters(), 1.0)
+    optimizer.step()
+    return {"loss": error.item(), "keypoint_std": z_y.detach().std(0).mean(-1).tolist()}
 
 
 def train(
@@ -208,10 +220,10 @@ def train(
 ) -> tuple[Transporter, list[dict]]:
     """Fit a Transporter on videos (T, 84, 84, 3) uint8: the translated ones and the robot's.
 
-    With robot frames as targets too, as here, the detector learns on what it later runs on; the
-    paper names only translated targets. Returns the model and a log: step, loss, and each
-    keypoint's standard deviation (near 0: glued to the background). Raises InputError for frames of
-    another shape or type.
+    Robot frames are targets too, so the detector learns on what it later runs on; the paper names
+    only translated targets. Returns the model and a log: step, loss, and each keypoint's standard
+    deviation (near 0: glued to the background). Raises InputError for frames of another shape or
+    type.
     """
     for i, v in enumerate(videos):
         if v.ndim != 4 or v.shape[1:] != (84, 84, 3) or v.dtype != np.uint8 or len(v) < 2:
@@ -219,65 +231,41 @@ def train(
                 f"video {i} is {v.shape} {v.dtype}; give two or more frames, (T, 84, 84, 3) uint8."
             )
     checkpoint = checkpoint or Checkpoint(None)
-    device, rng = pick_device(device), seed_everything(seed)
+    to, rng = pick_device(device), seed_everything(seed)
     lengths = np.array([len(v) for v in videos])
-    # 200 of each show the background
-    few = np.concatenate([v[:: len(v) // 200 + 1] for v in videos])
-    median = _to_network(torch.from_numpy(np.median(few, 0)[None])).to(device)  # (1, 3, 84, 84)
-    frames = torch.from_numpy(np.concatenate(videos)).to(device)
-    model, log, step = Transporter(K).to(device).train(), [], 0
+    few = np.concatenate([v[:: len(v) // 200 + 1] for v in videos])  # enough for the background
+    median = to_images(median_frame(few), to)  # (1, 3, 84, 84)
+    frames = np.concatenate(videos)
+    model = Transporter(K).to(to).train()
     optimizer = torch.optim.Adam(model.parameters(), betas=(0.9, 0.99))
-    if saved := checkpoint.load():
-        model.load_state_dict(saved["model"])
-        optimizer.load_state_dict(saved["optimizer"])
-        rng.bit_generator.state = saved["rng"]
-        log, step = saved["log"], saved["step"]
+    now, state = checkpoint.resume(dict(model=model, optimizer=optimizer, rng=rng), step=0, log=[])
 
-    def state():
-        trained = {"model": model.state_dict(), "optimizer": optimizer.state_dict()}
-        return trained | {"rng": rng.bit_generator.state, "log": log, "step": step}
-
-    bar = progress(iterations, "Transporter", step)
-    while step < iterations:
-        done = step / iterations
-        early = max(0.0, 1 - 2 * done)  # 1 at the start, 0 from half-way on
-        sigma = SIGMA + (SIGMA_START - SIGMA) * early
-        warm_up = min(1.0, (step + 1) / 20)
+    bar = progress(iterations, "Transporter", now.step)
+    while now.step < iterations:
+        done = now.step / iterations
+        warm_up = min(1.0, (now.step + 1) / 20)
         optimizer.param_groups[0]["lr"] = LEARNING_RATE * warm_up * (1 + np.cos(np.pi * done)) / 2
-        i_x, i_y = (torch.from_numpy(i).to(device) for i in _draw_pairs(lengths, BATCH, rng))
-        x, y = _to_network(frames[i_x]), _to_network(frames[i_y])
-        y_hat, z_y = model(x, y, _augment(y), sigma)
-        error = loss(y_hat, y, motion_weight(y, median))
-        optimizer.zero_grad()
-        (
-            error + SPREAD * early * crowding(z_y, sigma) + LOOK * (1 - early) * identity(z_y, y)
-        ).backward()
-        nn.utils.clip_grad_norm_(model.parameters(), 1.0)
-        optimizer.step()
-        step += 1
+        x, y = (to_images(frames[i], to) for i in _draw_pairs(lengths, BATCH, rng))
+        row = _update(model, optimizer, x, y, median, early=max(0.0, 1 - 2 * done))
+        now.step += 1
         bar.update()
-        if step % 50 == 0 or step == iterations:
-            spread = z_y.detach().std(0).mean(-1)  # (K,)
-            log.append({"step": step, "loss": error.item(), "keypoint_std": spread.tolist()})
-        checkpoint.save(state, force=step == iterations)
+        if now.step % LOG_EVERY == 0 or now.step == iterations:
+            now.log.append({"step": now.step} | row)
+        checkpoint.save(state, force=now.step == iterations)
     bar.close()
-    return model.eval(), log
+    return model.eval(), now.log
 
 
 @torch.inference_mode()
 def detect(model: Transporter, frames: np.ndarray) -> np.ndarray:
-    """Keypoints z (T, K, 2) float32 in [-1, 1], x right and y down, of frames (T, 84, 84, 3)
-    uint8."""
+    """Keypoints z (T, K, 2) float32, x right and y down, of frames (T, 84, 84, 3) uint8."""
     device = next(model.parameters()).device
-    batches = torch.tensor(frames).split(64)
-    return np.concatenate(
-        [model.keypoints(_to_network(b.to(device))).cpu().numpy() for b in batches]
-    )
+    batches = (frames[i : i + 64] for i in range(0, max(len(frames), 1), 64))
+    return np.concatenate([model.keypoints(to_images(b, device)).cpu().numpy() for b in batches])
 
 
 def _probe(z, true_px, z_held, true_held):
-    """True and predicted pixels of a least-squares map with intercept, on frames it was not fitted
-    on."""
+    """True and predicted pixels of a least-squares map with intercept, on held-out frames."""
     if z_held is None:
         # The last quarter: neighbouring frames are near copies, so a random split would leak.
         n = 3 * len(z) // 4
@@ -286,20 +274,28 @@ def _probe(z, true_px, z_held, true_held):
     return true_held, a_held @ np.linalg.lstsq(a, true_px, rcond=None)[0]
 
 
-def r2(z, true_px, z_held=None, true_held=None) -> np.ndarray:
-    """R^2 (D,) <= 1 of the best linear map from z (T, K, 2) to true_px (T, D), scored on held-out
-    frames.
+def r2(
+    z: np.ndarray,
+    true_px: np.ndarray,
+    z_held: np.ndarray | None = None,
+    true_held: np.ndarray | None = None,
+) -> np.ndarray:
+    """R^2 (D,) <= 1 of the best linear map from z (T, K, 2) to true_px (T, D), on held-out frames.
 
     Without a held-out set the last quarter is held out. A column that hardly moves has no
     meaningful R^2 (an object's height on a table): read its `pixel_error`.
     """
     true, predicted = _probe(z, true_px, z_held, true_held)
-    return 1 - ((true - predicted) ** 2).sum(0) / np.maximum(
-        ((true - true.mean(0)) ** 2).sum(0), 1e-9
-    )
+    residual, total = ((true - v) ** 2 for v in (predicted, true.mean(0)))
+    return 1 - residual.sum(0) / np.maximum(total.sum(0), 1e-9)
 
 
-def pixel_error(z, true_px, z_held=None, true_held=None) -> np.ndarray:
+def pixel_error(
+    z: np.ndarray,
+    true_px: np.ndarray,
+    z_held: np.ndarray | None = None,
+    true_held: np.ndarray | None = None,
+) -> np.ndarray:
     """Root mean square error (D,) in pixels of the map of `r2`."""
     true, predicted = _probe(z, true_px, z_held, true_held)
     return np.sqrt(((true - predicted) ** 2).mean(0))
@@ -307,14 +303,15 @@ def pixel_error(z, true_px, z_held=None, true_held=None) -> np.ndarray:
 
 def save(path: Path | str, model: Transporter, task: str) -> None:
     """Write the detector of `task` with its sizes, atomically."""
-    save_state(
-        path, {"kind": "transporter", "task": task, "K": model.K, "model": model.state_dict()}
-    )
+    what = {"kind": "transporter", "task": task, "K": model.K}
+    save_state(path, what | {"model": model.state_dict()})
 
 
 def load(path: Path | str, task: str | None = None) -> Transporter:
-    """The model in a file, on the CPU. Raises InputError if the file holds another thing or another
-    task."""
+    """The model in a file, on the CPU; any task's if `task` is None.
+
+    Raises InputError if the file holds another thing or another task.
+    """
     saved = load_state(path)
     if saved.get("kind") != "transporter":
         raise InputError(

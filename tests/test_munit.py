@@ -6,7 +6,8 @@ import torch
 from torch import nn
 
 from lbw_minimal import munit
-from lbw_minimal.munit import MUNIT, adain, discriminator_losses, generator_losses, swap
+from lbw_minimal.munit import MUNIT, discriminator_losses, generator_losses, swap
+from lbw_minimal.munit_networks import adain
 from lbw_minimal.training import Checkpoint, InputError, save_state
 
 
@@ -92,14 +93,6 @@ def test_critics_step_sends_no_gradient_to_the_generator():
     assert made.grad is None and critic.weight.grad is not None
 
 
-def test_motion_weight_is_one_on_the_median_frame_and_grows_with_the_distance():
-    median, frame = torch.zeros(1, 3, 2, 2), torch.zeros(1, 3, 2, 2)
-    frame[0, :, 0, 1] = torch.tensor([0.2, -0.4, 0.6])  # mean distance 0.4
-    assert torch.allclose(
-        munit.motion_weight(frame, median, 5.0), torch.tensor([[[[1.0, 3.0], [1.0, 1.0]]]])
-    )
-
-
 def test_motion_weighs_image_and_cycle_losses_pixel_by_pixel():
     x, y = image(1), image(2)
     # the weights' mean is 1 + MOTION_L1 / 4
@@ -157,12 +150,6 @@ def test_untrained_translation_is_middle_grey_whatever_the_frames(videos):
     mean = munit.mean_images(MUNIT(8), *videos)
     assert np.abs(mean["y_of_x"] - 127.5).max() < 25 and np.abs(mean["x_of_y"] - 127.5).max() < 25
     assert np.allclose(mean["y"], videos[1].mean(0))
-
-
-def test_frames_survive_the_way_to_images_and_back():
-    frames = np.arange(2 * 4 * 8 * 3, dtype=np.uint8).reshape(2, 4, 8, 3)
-    images = munit.to_images(frames)
-    assert images.shape == (2, 3, 4, 8) and np.array_equal(munit.to_frames(images), frames)
 
 
 def test_file_carries_sizes_weights_and_style(tmp_path):

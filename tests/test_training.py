@@ -203,6 +203,38 @@ def test_checkpoint_without_a_path_never_makes_a_state(tmp_path, monkeypatch):
     assert checkpoint.load() is None and list(tmp_path.iterdir()) == []
 
 
+def test_resume_brings_networks_generators_and_variables_back(tmp_path):
+    model, optimizer = learner()
+    rng = np.random.default_rng(0)
+    parts = {"model": model, "optimizer": optimizer, "rng": rng}
+    checkpoint = Checkpoint(tmp_path / "state")
+    now, state = checkpoint.resume(parts, step=0, log=[])
+    learn(model, optimizer, 2)
+    now.step, now.log = 2, [{"loss": 0.5}]
+    checkpoint.save(state, force=True)
+    drawn = rng.random(3)
+
+    twin, twin_optimizer = learner()
+    other = np.random.default_rng(9)
+    parts = {"model": twin, "optimizer": twin_optimizer, "rng": other}
+    then, _ = Checkpoint(tmp_path / "state").resume(parts, step=0, log=[])
+    assert (then.step, then.log) == (2, [{"loss": 0.5}])
+    assert torch.equal(model.weight, twin.weight) and np.array_equal(other.random(3), drawn)
+    torch.manual_seed(1)
+    learn(model, optimizer, 1)
+    torch.manual_seed(1)
+    learn(twin, twin_optimizer, 1)
+    assert torch.equal(model.weight, twin.weight)
+
+
+def test_resume_without_a_file_starts_anew():
+    rng = np.random.default_rng(0)
+    now, state = Checkpoint(None).resume({"rng": rng}, step=0, log=[])
+    assert vars(now) == {"step": 0, "log": []}
+    now.step += 1
+    assert state() == {"rng": rng.bit_generator.state, "step": 1, "log": []}
+
+
 def test_resumed_training_draws_the_same_random_numbers(tmp_path):
     torch.manual_seed(5)
     Checkpoint(tmp_path / "state").save(dict, force=True)

@@ -121,19 +121,15 @@ def test_loss_is_equation_7_by_hand():
     assert tp.loss(y_hat, y, torch.tensor([[[[1.0, 3.0]]]])) == pytest.approx((1 * 1 + 3 * 4) / 2)
 
 
-def test_motion_weight_is_1_on_the_background_and_grows_with_distance():
-    median, y = torch.zeros(1, 3, 1, 2), torch.zeros(1, 3, 1, 2)
-    y[..., 1] = torch.tensor([0.6, 0.0, -0.3])[:, None]  # mean distance 0.3
-    assert tp.motion_weight(y, median).flatten().tolist() == pytest.approx([1, 1 + tp.MOTION * 0.3])
-
-
 def test_pairs_are_near_each_other_or_drawn_freely_and_every_video_is_target_equally_often():
     source, target = tp._draw_pairs(np.array([1000, 50]), 4000, np.random.default_rng(0))
     same = (source < 1000) == (target < 1000)
-    near = same & (np.abs(source - target) <= tp.GAP)
+    near = same & (np.abs(source - target) <= tp.PAIR_GAP)
     assert source.min() >= 0 and source.max() < 1050 and target.max() < 1050
     assert 0.47 < (target < 1000).mean() < 0.53
-    assert 1 - tp.ACROSS < near.mean() < 1 - tp.ACROSS + 0.1  # some free pairs are near by chance
+    assert (
+        1 - tp.FREE_SHARE < near.mean() < 1 - tp.FREE_SHARE + 0.1
+    )  # some free pairs are near by chance
 
 
 def test_some_keypoint_follows_each_moving_square(trained):
