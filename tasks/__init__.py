@@ -3,8 +3,11 @@
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import gymnasium as gym
+
+from lbw_minimal.training import InputError
 
 ROOT = Path(__file__).resolve().parent.parent
 VIDEOS = ROOT / "tasks" / "videos"
@@ -25,6 +28,30 @@ def sentence(name: str) -> str:
 def id_of(name: str) -> str:
     """What Gymnasium calls the task."""
     return f"LbW-{name.capitalize()}-v0"
+
+
+def keypoint_env(name: str, reward: str | None = "mended", **options: Any) -> gym.Env:
+    """Task `name` as the paper's agent sees it, for any agent that speaks Gymnasium.
+
+    Observation: keypoints found by the shipped perception, (2K,) in [-1, 1], and what
+    `KeypointRewardWrapper` adds to them. reward: "mended" or "literal", for following the task's
+    human video; None leaves what the task itself pays, 1 where it is done and 0 elsewhere, and z_t
+    alone is observed. options: of the task's environment, such as `jitter` (m). Takes a few
+    seconds, because the robot is filmed to learn its pace. Raises InputError for an unknown task or
+    reward.
+    """
+    from lbw_minimal import imitate, video, wrappers
+    from tasks.world import record_random
+
+    if name not in TASKS:
+        raise InputError(f"{name}: there is no such task; choose one of {', '.join(TASKS)}.")
+    perception = imitate.load_perception(WEIGHTS / name, name)
+    env = gym.make(id_of(name), **options)
+    if reward is None:
+        return wrappers.KeypointObservation(env, perception.detect)
+    perception.watch(video.read(VIDEOS / name / "expert_01.mp4")[0])
+    robot, _ = record_random(gym.make(id_of(name)).unwrapped, imitate.PACE, seed=0)
+    return imitate.watched(env, perception, robot, reward)[0]
 
 
 for _name in TASKS:
