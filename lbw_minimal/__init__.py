@@ -1,2 +1,4 @@
-"""LbW minimal: the paper's method. It knows images, keypoints and actions, and nothing of the
-simulator."""
+"""LbW minimal: the paper's method.
+
+It knows images, keypoints and actions, and nothing of the simulator.
+"""

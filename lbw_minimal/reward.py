@@ -97,7 +97,7 @@ class MendedReward:
         self.last = len(z) - 1 if include_goal else len(z) - 2
 
     def __call__(self, z: np.ndarray, z_next: np.ndarray, t: int = 0) -> tuple[float, Parts]:
-        """r_t and its parts for z_t and z_{t+1}, (K, 2) each, at step t = 0, 1, ... of the episode."""
+        """r_t and its parts for z_t and z_{t+1}, (K, 2) each, at step t = 0, 1, ..."""
         if self.timed:
             z_p = self.target(t)
             v_q = z_p - self.z_E[min(t, self.last)]  # 0 once the goal is reached: stay there

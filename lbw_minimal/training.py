@@ -1,7 +1,7 @@
 """What every training shares: device, seeds, atomic files, checkpoint and resume, a log.
 
-In: a nested state of dicts, lists, numbers and tensors. Out: one safetensors file that is either
-the old one or the new one, never half of one, and from which nothing is ever unpickled.
+In: a nested state of dicts, lists, numbers and tensors. Out: one safetensors file, which is always
+the whole old one or the whole new one. Nothing in it is unpickled.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def write_atomic(path: Path | str, data: bytes | str) -> None:
 
 def _flatten(state, name, tensors):
     if isinstance(state, dict):
-        # Optimizers key their state by integers, JSON keys are strings: keep each key's type.
+        # Optimizers key their state by integers, and JSON's keys are strings: pairs keep the type.
         return {"dict": [[k, _flatten(v, f"{name}/{k}", tensors)] for k, v in state.items()]}
     if isinstance(state, list | tuple):
         return {"list": [_flatten(v, f"{name}/{i}", tensors) for i, v in enumerate(state)]}
@@ -77,8 +77,7 @@ def _unflatten(tree, tensors):
 
 
 def save_state(path: Path | str, state: dict) -> None:
-    """Save nested dicts, lists, JSON values, arrays and tensors as one safetensors file,
-    atomically."""
+    """Save nested dicts, lists, JSON values, arrays and tensors as one file, atomically."""
     tensors: dict[str, torch.Tensor] = {}
     tree = _flatten(state, "", tensors)
     write_atomic(path, save(tensors, metadata={"tree": json.dumps(tree)}))
@@ -96,9 +95,8 @@ def load_state(path: Path | str) -> dict:
             tensors = {k: f.get_tensor(k) for k in f.keys()}  # noqa: SIM118 (not a dict)
             tree = json.loads(f.metadata()["tree"])
     except (SafetensorError, KeyError, TypeError, ValueError):
-        raise InputError(
-            f"{path}: not a complete weights file; delete it and train again."
-        ) from None
+        sentence = f"{path}: not a complete weights file; delete it and train again."
+        raise InputError(sentence) from None
     return _unflatten(tree, tensors)
 
 
@@ -141,7 +139,7 @@ class Checkpoint:
         and NumPy generators. They are set to the saved state in place. variables: what the loop
         changes, with values for a new start; a checkpoint must be able to hold them.
 
-            now, state = checkpoint.resume({"model": model, "adam": adam, "rng": rng}, step=0, log=[])
+            now, state = checkpoint.resume({"model": model, "rng": rng}, step=0, log=[])
             while now.step < iterations:
                 ...
                 now.step += 1

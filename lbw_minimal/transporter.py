@@ -196,7 +196,7 @@ def _draw_pairs(lengths, n, rng):
 
 
 def _update(model, optimizer, x, y, median, early) -> dict:
-    """One step on pairs of images x, y (B, 3, 84, 84); `early` falls from 1 to 0. A row of the log."""
+    """One step on images x, y (B, 3, 84, 84), and its row of the log; `early` falls from 1 to 0."""
     sigma = SIGMA + (SIGMA_START - SIGMA) * early
     y_hat, z_y = model(x, y, _augment(y), sigma)
     error = loss(y_hat, y, motion_weight(y, median, MOTION))

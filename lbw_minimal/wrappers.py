@@ -48,7 +48,7 @@ class KeypointRewardWrapper(gym.Wrapper, RecordConstructorArgs):
 
     The clock alone would do in theory, but then the agent would have to learn the demonstration by
     heart. How things move decides a hit. The step before the last tells where the tip is drawn to:
-    its goal leads it, and no frame shows a goal. solutions/results/README.md has what each is worth.
+    its goal leads it, and no frame shows a goal. What each is worth: solutions/results/README.md.
     """
 
     def __init__(self, env: gym.Env, reward: KeypointReward):

@@ -45,7 +45,7 @@ def test_only_the_mended_reward_adds_to_the_keypoints(made):
 
 
 def test_what_an_idle_robot_earns(made):
-    """Nothing from the task, which it does not do; less than nothing for not following the video."""
+    """Nothing from the task, which it does not do; less than nothing for not following."""
     reward, env = made
     env.reset(seed=0)
     steps = [env.step(np.zeros(3, np.float32)) for _ in range(3)]

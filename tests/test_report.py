@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from lbw_minimal import report
+from lbw_minimal import pictures, report
 
 T, N, K = 4, 9, 3
 SCENE = "<!DOCTYPE html><html><body><p title=\"a & b\">scene</p><script>'<b>' && 1</script></body></html>"
@@ -89,51 +89,51 @@ def test_a_keypoint_is_drawn_on_the_pixel_it_names():
     """z = (-1 + 2 (20.5) / 84, ...) is the centre of pixel 20: columns 80 to 83 of the enlarged
     frame."""
     z = np.array([[[2 * 20.5 / 84 - 1, 2 * 60.5 / 84 - 1]]])
-    image = report.draw_keypoints(np.zeros((1, 84, 84, 3), np.uint8), z, scale=3)[0]
+    image = pictures.draw_keypoints(np.zeros((1, 84, 84, 3), np.uint8), z, scale=3)[0]
     rows, columns = np.nonzero(image.any(-1))
     assert abs(columns.mean() - 61) < 0.1 and abs(rows.mean() - 181) < 0.1
-    assert tuple(image[181, 61]) == report.colour(0)
+    assert tuple(image[181, 61]) == pictures.colour(0)
 
 
 def test_drawing_leaves_the_frames_alone():
     frames = np.zeros((2, 84, 84, 3), np.uint8)
-    report.draw_keypoints(frames, np.zeros((2, K, 2)), scale=1)
+    pictures.draw_keypoints(frames, np.zeros((2, K, 2)), scale=1)
     assert not frames.any()
 
 
 def test_a_keypoint_outside_the_image_is_no_error():
-    image = report.draw_keypoints(np.zeros((1, 84, 84, 3), np.uint8), np.full((1, 1, 2), 1.5))
+    image = pictures.draw_keypoints(np.zeros((1, 84, 84, 3), np.uint8), np.full((1, 1, 2), 1.5))
     assert not image.any()
 
 
 def test_a_strip_shows_first_and_last_frame():
     frames = np.arange(20, dtype=np.uint8)[:, None, None, None] * np.ones((84, 84, 3), np.uint8)
-    image = report.strip(frames, n=4, scale=2)
+    image = pictures.strip(frames, n=4, scale=2)
     assert image.shape == (168, 4 * 168, 3)
     assert [image[0, 168 * i, 0] for i in range(4)] == [0, 6, 13, 19]
 
 
 def test_a_video_shorter_than_the_strip_shows_each_frame_once():
-    assert report.strip(np.zeros((3, 84, 84, 3), np.uint8), n=8, scale=1).shape == (84, 3 * 84, 3)
+    assert pictures.strip(np.zeros((3, 84, 84, 3), np.uint8), n=8, scale=1).shape == (84, 3 * 84, 3)
 
 
 def test_the_curve_shows_the_mean_of_the_last_episodes():
     log = [{"step": 50 * i, "return": -i, "success": i % 2 == 0} for i in range(1, 5)]
-    above, below = report.curve(log, last=2).axes
+    above, below = pictures.curve(log, last=2).axes
     np.testing.assert_allclose(above.lines[1].get_ydata(), [0, 0.5, 0.5, 0.5])
     np.testing.assert_allclose(below.lines[1].get_ydata(), [-1, -1.5, -2.5, -3.5])
 
 
 def test_down_is_down_in_the_plots_of_keypoints():
     z = np.zeros((4, K, 2))
-    for axis in (report.paths(z, z).axes[0], report.courses(z, z).axes[1]):
+    for axis in (pictures.paths(z, z).axes[0], pictures.courses(z, z).axes[1]):
         top, bottom = axis.get_ylim()[::-1]
         assert top < bottom
 
 
 def test_the_film_keeps_every_frame_and_loops():
     frames = np.random.default_rng(0).integers(0, 256, (5, 84, 84, 3), np.uint8)
-    with Image.open(io.BytesIO(report.film(frames, 12.5))) as film:
+    with Image.open(io.BytesIO(pictures.film(frames, 12.5))) as film:
         assert (film.n_frames, film.info["loop"], film.size) == (5, 0, (84, 84))
         film.load()
         assert film.info["duration"] == 80  # ms
@@ -150,7 +150,7 @@ def test_the_page_has_every_section(page):
 def test_pictures_keep_their_colours():
     red = np.zeros((2, 2, 3), np.uint8)
     red[..., 0] = 255
-    data = base64.b64decode(report.png(red).split(",")[1])
+    data = base64.b64decode(pictures.png(red).split(",")[1])
     np.testing.assert_array_equal(np.asarray(Image.open(io.BytesIO(data))), red)
 
 

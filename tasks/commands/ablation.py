@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from lbw_minimal.report import COLOURS, STYLE
+from lbw_minimal.pictures import COLOURS, STYLE
 from lbw_minimal.reward import MENDS
 from lbw_minimal.training import write_atomic
 from tasks.commands import Parser, table

@@ -16,7 +16,8 @@ import numpy as np
 import tasks
 from lbw_minimal import sac, video
 from lbw_minimal.imitate import PACE, load_perception, watched
-from lbw_minimal.report import CSS, data_uri, demonstration, draw_keypoints, film, picture
+from lbw_minimal.pictures import data_uri, draw_keypoints, film, picture
+from lbw_minimal.report import CSS, demonstration
 from lbw_minimal.training import write_atomic
 from tasks.commands import Parser, make_folder
 from tasks.commands.viewer import perform
