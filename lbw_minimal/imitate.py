@@ -1,19 +1,21 @@
 """Learning by Watching, the whole method: one human video in, a policy out.
 
-    translate (Eq. 1-5)  ->  detect keypoints (Eq. 6-7)  ->  reward (Eq. 8-10)  ->  soft
-    actor-critic
+    translate (Eq. 1-5) -> detect keypoints (Eq. 6-7) -> reward (Eq. 8-10) -> soft actor-critic
 
-Every stage leaves its result as a file in the run's folder and is skipped where that file exists,
-so a run that was killed goes on where it was. Frames are all that any stage learns from.
+Every stage leaves its result as a file in the run's folder and is skipped if that file exists, so a
+run that was killed goes on where it was. Frames are all that any stage learns from.
 """
 
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
+import gymnasium as gym
 import numpy as np
 import torch
 from gymnasium.wrappers import TimeLimit
@@ -23,9 +25,9 @@ from lbw_minimal.reward import KeypointReward, LiteralReward, MendedReward
 from lbw_minimal.training import Checkpoint, InputError, write_atomic
 from lbw_minimal.wrappers import KeypointObservation, KeypointRewardWrapper
 
-# frames of random robot motion that show its pace; so few are filmed again in a second or two,
+# Frames of random robot motion that show its pace. They are so few that they can be filmed again in
+# seconds, which gives a trained policy the very reward it was trained on.
 PACE = 400
-# and a policy is followed up with the very reward it was trained on
 
 
 @dataclass(frozen=True)
@@ -38,28 +40,25 @@ class Recipe:
     munit_width: int = 20  # channels of the first layer
     transporter_iterations: int = 600
     K: int = 5  # keypoints
-    # environment steps of SAC; most tasks are solved every time from 2,000 on
-    policy_steps: int = 5_000
+    policy_steps: int = 5_000  # environment steps of SAC
 
 
 @dataclass
 class Perception:
-    """The trained translator T and keypoint detector Psi, with what they make of the
-    demonstration."""
+    """The trained translator T and detector Psi, and what they see in the demonstration."""
 
     translator: munit.MUNIT
     style: torch.Tensor  # (style_dim,) the robot style that every human frame is given
     detector: transporter.Transporter
-    translated: np.ndarray | None = None  # v^E (N, 84, 84, 3) uint8
-    z_E: np.ndarray | None = None  # (N, K, 2)
+    translated: np.ndarray = field(init=False)  # v^E (N, 84, 84, 3) uint8, from `watch`
+    z_E: np.ndarray = field(init=False)  # (N, K, 2), from `watch`
 
     def translate(self, frames: np.ndarray) -> np.ndarray:
         """Human frames (T, 84, 84, 3) uint8 as the robot would look, same shape."""
         return munit.translate(self.translator, frames, self.style)
 
     def watch(self, demo: np.ndarray) -> None:
-        """Translate the demonstration (N, 84, 84, 3) uint8 and find its keypoint trajectory,
-        once."""
+        """Translate the demonstration (N, 84, 84, 3) uint8 and find its keypoint trajectory."""
         self.translated = self.translate(demo)  # v_1^E .. v_N^E
         self.z_E = self.detect(self.translated)  # z_1^E .. z_N^E
 
@@ -77,19 +76,21 @@ class Run:
         self.metrics = json.loads(path.read_text()) if path.exists() else {"stages": {}}
 
     def save(self) -> None:
+        """Write metrics.json."""
         write_atomic(self.out / "metrics.json", json.dumps(self.metrics, indent=1) + "\n")
 
     @contextmanager
-    def stage(self, name: str):
-        """Lend a checkpoint to a training; when that is through, note its time and drop the
-        file."""
-        checkpoint = Checkpoint(self.out / f"{name}.checkpoint")
+    def stage(self, name: str) -> Iterator[Checkpoint]:
+        """Lend a checkpoint to a training. Afterwards note the time it took and drop the file."""
+        path = self.out / f"{name}.checkpoint"
+        checkpoint = Checkpoint(path)
         yield checkpoint
         self.metrics["stages"][name] = round(checkpoint.spent, 1)
         self.save()
-        checkpoint.path.unlink(missing_ok=True)
+        path.unlink(missing_ok=True)
 
     def log(self, name: str, rows: list[dict]) -> None:
+        """Write the log of a training."""
         write_atomic(self.out / f"{name}.json", json.dumps(rows) + "\n")
 
 
@@ -103,9 +104,22 @@ def load_perception(folder: Path, task: str) -> Perception:
     return Perception(translator, style, detector)
 
 
-def learn_perception(demo, random, robot, recipe, *, task, seed, run, device="cpu") -> Perception:
-    """Train T and Psi from human frames (demonstration and random motion) and random robot
-    frames."""
+def learn_perception(
+    demo: np.ndarray,
+    random: np.ndarray,
+    robot: np.ndarray,
+    recipe: Recipe,
+    *,
+    task: str,
+    seed: int,
+    run: Run,
+    device: str = "cpu",
+) -> Perception:
+    """Train T and Psi on frames (T, 84, 84, 3) uint8 of the human and the robot.
+
+    demo: the demonstration; random, robot: random motion of the human, which may be empty, and of
+    the robot. task: what the files are marked with.
+    """
     human = np.concatenate([demo, random])
     path = run.out / "translation.safetensors"
     if not path.exists():
@@ -148,35 +162,41 @@ def make_reward(
         return LiteralReward(perception.z_E)
     if form != "mended":
         raise InputError(f"reward form {form!r}: choose 'literal' or 'mended'.")
-    switches = {without: False} if without else {}
+    switches: dict[str, Any] = {without: False} if without else {}
     z_robot = perception.detect(robot[:PACE])
     return MendedReward(perception.z_E, z_robot, horizon=horizon, **switches)
 
 
-def watched(env, perception: Perception, robot, form="mended", without=None):
+def watched(
+    env: gym.Env,
+    perception: Perception,
+    robot: np.ndarray,
+    form: str = "mended",
+    without: str | None = None,
+) -> tuple[gym.Env, KeypointReward]:
     """`env` as the paper's agent sees it, observing keypoints and earning r_t, and that reward.
 
     An episode ends some time after the demonstration does, even if the horizon is longer: nothing
     is left to do then. The other arguments are those of `make_reward`.
     """
-    horizon = env.spec.max_episode_steps
+    horizon = env.spec.max_episode_steps if env.spec else None
     reward = make_reward(perception, robot, form, without=without, horizon=horizon)
     env = KeypointRewardWrapper(KeypointObservation(env, perception.detect), reward)
-    return TimeLimit(env, min(horizon, reward.episode)), reward
+    return TimeLimit(env, min(horizon or reward.episode, reward.episode)), reward
 
 
 def imitate(
-    env,
-    demo,
-    robot,
+    env: gym.Env,
+    demo: np.ndarray,
+    robot: np.ndarray,
     perception: Perception,
     recipe: Recipe,
     *,
-    seed,
+    seed: int,
     run: Run,
-    form="mended",
-    without=None,
-):
+    form: str = "mended",
+    without: str | None = None,
+) -> tuple[sac.SAC, gym.Env]:
     """Learn a policy for `env`, a Gymnasium environment of RGB frames, from one demonstration.
 
     demo (N, 84, 84, 3) uint8: the human video. robot (M, 84, 84, 3) uint8: random robot motion.

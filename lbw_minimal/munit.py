@@ -156,7 +156,7 @@ def _update(model, critics, adam_G, adam_D, x, y, medians) -> dict[str, float]:
     with bfloat16(x.device):  # on the translations made above: new ones would cost an eighth more
         L_D = discriminator_losses(critics, x, y, swapped, *medians)
     adam_D.zero_grad()
-    sum(L_D.values()).backward()
+    (L_D["L_D^x"] + L_D["L_D^y"]).backward()
     adam_D.step()
     return {name: loss.item() for name, loss in (L_G | L_D).items()}
 

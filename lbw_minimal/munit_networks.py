@@ -68,7 +68,7 @@ class _Decoder(nn.Module):
         # Start at middle grey. At the ends of tanh a wrong brightness would stick.
         with torch.no_grad():
             self.out.weight.mul_(0.1)
-            self.out.bias.zero_()
+        self.out.bias = nn.Parameter(torch.zeros(3))
 
     def forward(self, c, s):
         p = self.mlp(s).view(len(s), len(self.blocks), 4, -1)  # (B, blocks, 4, 4 width)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import base64
 import io
+from typing import Any
 
 import cv2
 import numpy as np
@@ -17,7 +18,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 COLOURS = ("#E69F00", "#0072B2", "#009E73", "#CC79A7", "#D55E00", "#56B4E9", "#F0E442", "#000000")
-STYLE = {
+STYLE: dict[Any, Any] = {
     "axes.spines.top": False,
     "axes.spines.right": False,
     "axes.grid": True,
@@ -31,7 +32,8 @@ STYLE = {
 
 def colour(k: int) -> tuple[int, int, int]:
     """RGB of keypoint k, the same in every picture."""
-    return tuple(bytes.fromhex(COLOURS[k % len(COLOURS)][1:]))
+    r, g, b = bytes.fromhex(COLOURS[k % len(COLOURS)][1:])
+    return r, g, b
 
 
 def draw_keypoints(frames: np.ndarray, z: np.ndarray, scale: int = 4) -> np.ndarray:
@@ -117,7 +119,9 @@ def paths(z_demo: np.ndarray, z: np.ndarray, background: np.ndarray | None = Non
             axis.plot(*z[0, k], "o", color=paint, mfc="white", ms=6)
             axis.plot(*z[-1, k], "o", color=paint, mec="black", ms=12)
             text = np.array(ink(k)) / 255
-            axis.text(*z[-1, k], k + 1, ha="center", va="center_baseline", fontsize=8, color=text)
+            x, y = z[-1, k]
+            label = axis.text(x, y, str(k + 1), fontsize=8, color=text)
+            label.set(ha="center", va="center_baseline")
         ticks = (-1, -0.5, 0, 0.5, 1)
         axis.set(xlim=(-1, 1), ylim=(1, -1), xticks=ticks, yticks=ticks, aspect="equal")
         axis.set(

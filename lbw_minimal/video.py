@@ -1,9 +1,12 @@
-"""Video files, in and out. What a camera filmed becomes frames of the paper's size, checked before
-anything is learnt from them; frames of a simulator become a film that a browser plays.
+"""Video files, in and out.
 
 In: any file that OpenCV's FFmpeg decodes, of any size and frame rate. Out: frames (T, 84, 84, 3)
-uint8 RGB. Pauses are not cut here but on the keypoint trajectory, where stillness does not depend
-on light and noise.
+uint8 RGB, checked before anything is learnt from them. The other way round, frames become a film
+that a browser plays. Pauses are not cut here but on the keypoint trajectory, where stillness does
+not depend on light and noise.
+
+The figures in the comments were measured on the kit's videos and two clips of the authors while the
+kit was built; no file in solutions/results holds them.
 """
 
 from __future__ import annotations
@@ -12,6 +15,7 @@ import contextlib
 import mmap
 import os
 import tempfile
+from collections.abc import Iterable
 from itertools import chain
 from pathlib import Path
 
@@ -23,21 +27,19 @@ from lbw_minimal.training import InputError, write_atomic
 SIZE = 84  # pixels, both sides of a frame
 MAX_FRAMES = 2000  # 42 MB; the human videos of the paper have 398 to 1,056
 LOOK_AT = 60  # frames that the checks of motion and camera look at, spread over the video
-# Grey levels, the local mean taken off. Sensor noise of 16 levels changes 0.04 % of a frame's
-# pixels by more, the smallest motion among our clips (a reach) 1.8 %.
+# Grey levels, after the local mean is taken off. Sensor noise of 16 levels moves 0.04 % of a
+# frame's pixels by more than this, the smallest motion among our clips (a reach) 1.8 %.
 MOVED = 16
 MOVED_SHARE = 0.005  # 35 pixels: less is noise, or an object too small for a keypoint
-# How often the steadiest two fifths of the edges stay where they are: in 0.93 of the frames and
-# more in 20 rendered and 2 real clips, with noise of 8 levels too; 0.66 and less where a real clip
-# was panned by 15 pixels, 0.80 where a drawn room was panned by 10, 0.43 and less where shaken by
-# 2.
+# The share of frames in which the steadiest two fifths of the edges stay where they are. It is 0.93
+# or more in 20 rendered and 2 real clips, with noise of 8 levels too. It is 0.66 or less if a real
+# clip is panned by 15 pixels, 0.80 if a drawn room is panned by 10, 0.43 or less if shaken by 2.
 STEADY = 0.87
 EDGE = 3  # grey levels per pixel: weaker edges drown in noise
 
 
 def read(path: Path | str) -> tuple[np.ndarray, list[str]]:
-    """Frames (T, 84, 84, 3) uint8 RGB of a video, its central square shrunk, and warnings, a
-    sentence each.
+    """Frames (T, 84, 84, 3) uint8 RGB of a video's central square, and warnings, a sentence each.
 
     A longer video than MAX_FRAMES is thinned evenly. Only one full-size frame is held at a time.
     Raises InputError if the file is missing, no video, cut short, shorter than two frames, smaller
@@ -74,7 +76,7 @@ def read(path: Path | str) -> tuple[np.ndarray, list[str]]:
 
 @contextlib.contextmanager
 def _silence():
-    """OpenCV and FFmpeg print to stderr on every bad file, beside the one sentence that we say."""
+    """Keeps OpenCV and FFmpeg from printing to stderr beside our one sentence on a bad file."""
     name = "OPENCV_FFMPEG_LOGLEVEL"  # read whenever a file is opened
     level, asked = cv2.utils.logging.getLogLevel(), os.environ.get(name)
     cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
@@ -95,7 +97,7 @@ def _decode(path):
         raise InputError(f"{path}: {_why_closed(path)}")
     kept, every, count = [], 1, 0
     while film.grab():
-        # the colours of a phone's HDR cost 0.1 s a frame: only where it is kept
+        # Only what is kept is converted: the colours of a phone's HDR cost 0.1 s a frame.
         if count % every == 0:
             kept.append(_shrink(film.retrieve()[1], path))
             if len(kept) > MAX_FRAMES:  # the header's frame count may lie, so thin as they come
@@ -140,8 +142,7 @@ def _shrink(bgr, path):
 
 
 def _high_pass(frames):
-    """Grey frames (<= LOOK_AT, 84, 84) without their local mean: what a change of exposure leaves
-    alone."""
+    """Grey frames (<= LOOK_AT, 84, 84) without their local mean, so that exposure may change."""
     pick = np.linspace(0, len(frames) - 1, min(len(frames), LOOK_AT)).astype(int)
     grey = [cv2.cvtColor(frames[i], cv2.COLOR_RGB2GRAY).astype(np.float32) for i in pick]
     grey = [cv2.GaussianBlur(g, (3, 3), 0) for g in grey]
@@ -166,12 +167,12 @@ def _steadiness(still, background):
     return np.percentile(stays.mean(axis=0), 60)
 
 
-def write(path: Path | str, frames, fps: float, scale: int = 2) -> None:
-    """Write RGB uint8 frames (H, W, 3) as an mp4 that browsers play; the old file stays if anything
-    fails.
+def write(path: Path | str, frames: Iterable[np.ndarray], fps: float, scale: int = 2) -> None:
+    """Write RGB uint8 frames (H, W, 3) as an mp4 that browsers play.
 
-    VP9, because its decoding is exact on every machine. Halved colour resolution is why frames are
-    enlarged `scale` times, pixel by pixel; `read` shrinks them back. Measured on 84x84 frames of
+    The old file stays if anything fails. The codec is VP9, because its decoding is exact on every
+    machine. It halves the resolution of colour, so frames are enlarged `scale` times, pixel by
+    pixel; `read` shrinks them back. Measured on 84x84 frames of
     the tasks: scale 1 takes 280 bytes a frame and moving pixels come back with a PSNR of 35 dB,
     scale 2 500 and 40 dB, scale 4 580, 41 dB and three times the time. MPEG-4 at scale 2 takes 300
     bytes, 37 dB, and no browser plays it. Raises InputError if there are no frames, OSError if the
@@ -185,7 +186,7 @@ def write(path: Path | str, frames, fps: float, scale: int = 2) -> None:
     with tempfile.TemporaryDirectory() as folder:
         part = Path(folder) / "film.mp4"
         film = cv2.VideoWriter(
-            str(part), cv2.CAP_FFMPEG, cv2.VideoWriter_fourcc(*"vp09"), fps, size
+            str(part), cv2.CAP_FFMPEG, cv2.VideoWriter.fourcc(*"vp09"), fps, size
         )
         if not film.isOpened():
             raise RuntimeError(

@@ -46,7 +46,8 @@ def test_a_finished_stage_is_loaded_and_not_trained_again(tmp_path):
 def watcher():
     """Perception whose detector is a formula, after a demonstration in which everything moves."""
     way = np.cumsum(np.random.default_rng(0).normal(size=(30, 2, 2)) * 0.03, axis=0)
-    perception = Perception(None, None, None, z_E=way)
+    perception = Perception(None, None, None)
+    perception.z_E = way
     perception.detect = lambda frames: np.cumsum(np.full((len(frames), 2, 2), 0.02), axis=0)
     return perception
 
