@@ -38,11 +38,12 @@ BOOK = ROOT / "runs" / "book"
 TIMEOUT = 1800  # s, for one cell
 STYLE = """
 body { margin: 0 auto !important; max-width: 62rem; padding: 0 1rem 4rem }
-nav { position: sticky; top: 0; z-index: 9; display: flex; gap: 1.5rem; padding: .6rem 1rem; background: #fff;
-  border-bottom: 1px solid #ddd; font: 15px system-ui, sans-serif }
+nav { position: sticky; top: 0; z-index: 9; display: flex; gap: 1.5rem; padding: .6rem 1rem;
+  background: #fff; border-bottom: 1px solid #ddd; font: 15px system-ui, sans-serif }
 nav label { margin-left: auto }
 body:has(#plain:checked) .jp-InputArea:has(.jp-CodeMirrorEditor) { display: none }
-body:has(#plain:checked) .jp-InputPrompt, body:has(#plain:checked) .jp-OutputPrompt { visibility: hidden }
+body:has(#plain:checked) .jp-InputPrompt { visibility: hidden }
+body:has(#plain:checked) .jp-OutputPrompt { visibility: hidden }
 math[display=block] { margin: .8em 0 }
 img { max-width: 100% }
 @media print {
@@ -57,7 +58,7 @@ li { margin: .7rem 0; list-style: none } ul { padding: 0 } a { color: #0072b2; f
 p { margin: .1rem 0 }
 """
 MATH = re.compile(r"(`+.*?`+)|\$\$(.+?)\$\$|\$([^$\n]+?)\$", re.DOTALL)
-# PyBullet's, to everybody who imports it
+# What PyBullet prints to everybody who imports it.
 GREETING = re.compile(r"(pybullet build time: .*|argv\[0\]=)\n?")
 
 
@@ -68,14 +69,8 @@ def sources() -> list[Path]:
 
 def student(source: Path) -> str:
     """The student version of a solved notebook, as the text of its file."""
-    steps = [
-        ClearSolutions,
-        LockCells,
-        CheckCellMetadata,
-        ClearOutput,
-        ClearHiddenTests,
-        ComputeChecksums,
-    ]
+    steps = [ClearSolutions, LockCells, CheckCellMetadata, ClearOutput]
+    steps += [ClearHiddenTests, ComputeChecksums]
     config = Config()
     config.NotebookExporter.preprocessors = steps
     config.ClearSolutions.code_stub = {"python": STUB}
@@ -90,8 +85,10 @@ def release() -> None:
 
 
 def execute(source: Path) -> nbformat.NotebookNode:
-    """The solved notebook with its outputs, run where students run it. Raises
-    CellExecutionError."""
+    """The solved notebook with its outputs, run where students run it.
+
+    Raises CellExecutionError.
+    """
     notebook, _ = ClearHiddenTests().preprocess(nbformat.read(source, as_version=4), {})
     where = {"metadata": {"path": str(HERE)}}
     ExecutePreprocessor(timeout=TIMEOUT, kernel_name="python3").preprocess(notebook, where)
@@ -99,8 +96,7 @@ def execute(source: Path) -> nbformat.NotebookNode:
 
 
 def mathml(found: re.Match) -> str:
-    """What `MATH` found as MathML, which browsers show without a script from the network; code as
-    it is."""
+    """What `MATH` found as MathML, which needs no script from the network; code as it is."""
     return found[1] or convert(found[2] or found[3], display="block" if found[2] else "inline")
 
 
@@ -125,17 +121,16 @@ def page(notebook: nbformat.NotebookNode, source: Path) -> str:
         if cell.cell_type == "markdown":
             cell.source = MATH.sub(keep, cell.source)
         for output in list(cell.get("outputs", [])):
-            # a progress bar: as it stood at its end, and no error
+            # A progress bar: as it stood at its end, and no error.
             if "\r" in output.get("text", ""):
                 output.text, output.name = re.sub(r"[^\n]*\r", "", output.text), "stdout"
             if GREETING.fullmatch(output.get("text", "")):
                 cell.outputs.remove(output)
     exporter = HTMLExporter(embed_images=True, mathjax_url="", require_js_url="")
     exporter.exclude_anchor_links = True
-    html, _ = exporter.from_notebook_node(
-        notebook, {"metadata": {"name": escape(opening(source)[0])}}
-    )
-    # mermaid, from a network
+    name = {"metadata": {"name": escape(opening(source)[0])}}
+    html, _ = exporter.from_notebook_node(notebook, name)
+    # Mermaid would come from the network.
     html = re.sub(r'<script type="module">.*?</script>', "", html, flags=re.DOTALL)
     html = re.sub(r"EQUATION(\d+)HERE", lambda m: equations[int(m[1])], html)
     order = sources()
@@ -143,7 +138,8 @@ def page(notebook: nbformat.NotebookNode, source: Path) -> str:
     links = ['<a href="index.html">contents</a>']
     for near in (*order[max(0, i - 1) : i], *order[i + 1 : i + 2]):
         links.append(f'<a href="{near.stem}.html">{opening(near)[0]}</a>')
-    bar = f'<nav>{"".join(links)}<label><input type="checkbox" id="plain"> hide the code</label></nav>'
+    switch = '<label><input type="checkbox" id="plain"> hide the code</label>'
+    bar = f"<nav>{''.join(links)}{switch}</nav>"
     html = html.replace("</head>", f"<style>{STYLE}</style></head>", 1)
     return re.sub(r"(<body[^>]*>)", lambda found: found[1] + bar, html, count=1)
 
@@ -154,9 +150,10 @@ def contents() -> str:
     for source in sources():
         title, question = opening(source)
         rows.append(f'<li><a href="{source.stem}.html">{title}</a><p>{question}</p></li>')
+    title = "LbW minimal, the course"
     return (
-        f'<!doctype html><html lang="en"><meta charset="utf-8"><title>LbW minimal, the course</title>'
-        f"<style>{INDEX}</style><h1>LbW minimal, the course</h1><ul>{''.join(rows)}</ul></html>\n"
+        f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{title}</title>'
+        f"<style>{INDEX}</style><h1>{title}</h1><ul>{''.join(rows)}</ul></html>\n"
     )
 
 

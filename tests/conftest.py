@@ -6,6 +6,5 @@ import torch
 
 @pytest.fixture(autouse=True)
 def one_thread():
-    """Two threads on a machine whose second core is busy wait for each other, and take ten times as
-    long."""
+    """Two threads wait for each other where the second core is busy, and take ten times as long."""
     torch.set_num_threads(1)

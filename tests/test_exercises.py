@@ -1,5 +1,4 @@
-"""The exercises themselves: references earn everything, and every anticipated mistake gets its own
-hint."""
+"""The exercises themselves: references earn everything, every mistake gets its own hint."""
 
 import numpy as np
 import pytest
@@ -10,11 +9,12 @@ from tests.grade.judge import judge
 
 ALL = everything()
 NONSENSE = [
-    None, True, 0, -1, 1 << 62, 1 << 150, 1.5, float("nan"), float("inf"), "", "fair", b"x", [], [1], [[1]],
-    (), {}, (1, 2), (1, 2, 3), ((),), ({},), {"a": 1}, {(1, 2): 3}, (None,) * 3, (1 << 150,) * 2, [0, "a"],
-    ["a", "b"], (True, False), (0.0,) * 5, np.zeros(0), np.zeros(()), np.zeros((1, 1, 1)), np.float32(3),
-    np.zeros(3, complex), np.full(3, np.nan), np.zeros(3, bool), np.zeros(3, int), np.bool_(True),
-    np.zeros((2, 0, 3)), np.array(["a"]), (np.zeros(3), np.zeros(3)), [np.zeros(2), "a"], {"x": np.zeros(2)},
+    None, True, 0, -1, 1 << 62, 1 << 150, 1.5, float("nan"), float("inf"), "", "fair", b"x",
+    [], [1], [[1]], (), {}, (1, 2), (1, 2, 3), ((),), ({},), {"a": 1}, {(1, 2): 3},
+    (None,) * 3, (1 << 150,) * 2, [0, "a"], ["a", "b"], (True, False), (0.0,) * 5,
+    np.zeros(0), np.zeros(()), np.zeros((1, 1, 1)), np.zeros((2, 0, 3)), np.zeros(3, complex),
+    np.zeros(3, bool), np.zeros(3, int), np.full(3, np.nan), np.float32(3), np.bool_(True),
+    np.array(["a"]), (np.zeros(3), np.zeros(3)), [np.zeros(2), "a"], {"x": np.zeros(2)},
     Raised("KeyError", "x"), Other("set"),
 ]  # fmt: skip
 MISTAKES = [(e, m) for e in ALL.values() for m in e.mistakes]

@@ -1,6 +1,8 @@
-"""Grading a class of which some crash, hang, or cheat: each gets what its answers are worth, and
-nobody else pays for it. The submissions are notebook 6, with exercise 6.1 answered in one of many
-bad ways."""
+"""Grading a class of which some crash, hang, or cheat.
+
+Each gets what its answers are worth, and nobody else pays for it. The submissions are notebook 6,
+with exercise 6.1 answered in one of many bad ways.
+"""
 
 import copy
 import csv
@@ -46,7 +48,8 @@ BAD = {
     ),
     "100 GB": ("def r1(z, z_E):\n    return np.ones(100 << 27).sum()", 0),
     "a gigabyte printed": (
-        "import sys\nfor _ in range(1 << 10):\n    sys.stdout.write('x' * (1 << 20))\n" + RIGHT, E61.points,
+        "import sys\nfor _ in range(1 << 10):\n    sys.stdout.write('x' * (1 << 20))\n" + RIGHT,
+        E61.points,
     ),
     "a full disk": ("def r1(z, z_E):\n    open('/tmp/x', 'wb').write(b'0' * (1 << 34))", 0),
     "os._exit(0)": ("import os\ndef r1(z, z_E):\n    os._exit(0)", 0),
@@ -64,7 +67,8 @@ BAD = {
         0,
     ),
     "patched comparisons": (
-        "for name in ('allclose', 'isclose', 'array_equal'):\n    setattr(np, name, lambda *a, **k: True)\n"
+        "for name in ('allclose', 'isclose', 'array_equal'):\n"
+        "    setattr(np, name, lambda *a, **k: True)\n"
         "torch.allclose = lambda *a, **k: True\ndef r1(z, z_E):\n    return 1.0",
         0,
     ),
@@ -73,7 +77,8 @@ BAD = {
         0,
     ),
     "equals everything": (
-        "class Yes(float):\n    def __eq__(self, other):\n        return True\n    __hash__ = None\n"
+        "class Yes(float):\n    __hash__ = None\n"
+        "    def __eq__(self, other):\n        return True\n"
         "def r1(z, z_E):\n    return Yes(1)",
         0,
     ),
@@ -91,7 +96,9 @@ BAD = {
     ),
     "reads the solutions": (f"got = open({str(SOURCE)!r}).read()\n" + NEEDS, 0),
     "reads another submission": ("got = open(CLASS + '/good/06_reward.ipynb').read()\n" + NEEDS, 0),
-    "reads the checks": (f"got = open({str(ROOT / 'tests' / 'test_grading.py')!r}).read()\n" + NEEDS, 0),
+    "reads the checks": (
+        f"got = open({str(ROOT / 'tests' / 'test_grading.py')!r}).read()\n" + NEEDS, 0,
+    ),
     "opens a socket": ("import socket\ngot = socket.socket()\n" + NEEDS, 0),
     "imports the answer": (
         "from lbw_minimal.reward import LiteralReward\n"
@@ -103,7 +110,8 @@ BAD = {
     ),
     "starts a program": ("import subprocess\ngot = subprocess.run(['ls'])\n" + NEEDS, 0),
     "forges the channel": (
-        "import os\nfor fd in range(3, 64):\n    try:\n        os.write(fd, bytes(8) + b'{}' * 100)\n"
+        "import os\nfor fd in range(3, 64):\n"
+        "    try:\n        os.write(fd, bytes(8) + b'{}' * 100)\n"
         "    except OSError:\n        pass\n" + RIGHT,
         0,
     ),
@@ -113,14 +121,19 @@ BAD = {
     "a list that holds itself": ("def r1(z, z_E):\n    x = []\n    x.append(x)\n    return x", 0),
     "no Python": ("this is no Python", 0),
     "a thread that stays": (
-        "import threading, time\nthreading.Thread(target=time.sleep, args=(10_000,)).start()\n" + RIGHT,
+        "import threading, time\n"
+        "threading.Thread(target=time.sleep, args=(10_000,)).start()\n" + RIGHT,
         E61.points,
     ),
     # Right answers that do not look like ours.
     "the stub left below": (RIGHT + f"    {STUB}\n", E61.points),
     "the stub as a comment": (f"# {STUB}\n{RIGHT}", E61.points),
-    "a lambda": ("r1 = lambda z, z_E: -np.sqrt(((z_E[:-1] - z) ** 2).sum((1, 2))).min()", E61.points),
-    "tries it out": (f"{RIGHT}\nprint(r1(z_E[0], z_E))\ndisplay(r1)\nassert not r1(z_E[0], z_E)", E61.points),
+    "a lambda": (
+        "r1 = lambda z, z_E: -np.sqrt(((z_E[:-1] - z) ** 2).sum((1, 2))).min()", E61.points,
+    ),
+    "tries it out": (
+        f"{RIGHT}\nprint(r1(z_E[0], z_E))\ndisplay(r1)\nassert not r1(z_E[0], z_E)", E61.points,
+    ),
     "checks itself": (f"from tests.grade import check\n{RIGHT}\ncheck('6.1')", E61.points),
     "plots": (f"import matplotlib.pyplot as plt\n{RIGHT}\nplt.plot([0, 1])", E61.points),
     "magic": (f"%%time\n{RIGHT}\nnp.linalg.norm?\n!ls\n%timeit r1", E61.points),
@@ -147,11 +160,9 @@ CLOSED = shutil.which("bwrap") or has_landlock()
 
 
 def cell_of(notebook, grade_id):
-    return next(
-        c
-        for c in notebook["cells"]
-        if c["metadata"].get("nbgrader", {}).get("grade_id") == grade_id
-    )
+    marks = (cell["metadata"].get("nbgrader", {}) for cell in notebook["cells"])
+    pairs = zip(notebook["cells"], marks, strict=True)
+    return next(cell for cell, mark in pairs if mark.get("grade_id") == grade_id)
 
 
 def answered(source):
@@ -174,11 +185,8 @@ def grades(out):
         done = json.loads(path.read_text())
         first, *others = done["exercises"]
         said = {o["message"] for o in first["outcomes"]} | set(done["notes"])
-        found[done["submission"]] = (
-            first["points"],
-            sum(e["points"] for e in others),
-            " ".join(sorted(said)),
-        )
+        rest = sum(e["points"] for e in others)
+        found[done["submission"]] = first["points"], rest, " ".join(sorted(said))
     return found
 
 
@@ -220,7 +228,6 @@ def test_importing_the_answer_gets_a_hint_that_says_so(class_of_cheats):
 
 
 # Notebooks that are not what they should be
-# ------------------------------------------------------------
 
 
 def without(grade_id):
@@ -260,9 +267,8 @@ def other_kernel():
 def strange_metadata():
     notebook = copy.deepcopy(SOLVED)
     notebook["cells"][1]["metadata"] = {"nbgrader": [1, 2, 3]}
-    notebook["cells"].append(
-        {"cell_type": "code", "metadata": {}, "source": ["%timeit 1\n", "!ls\n"]}
-    )
+    magics = {"cell_type": "code", "metadata": {}, "source": ["%timeit 1\n", "!ls\n"]}
+    notebook["cells"].append(magics)
     return notebook
 
 
@@ -292,7 +298,10 @@ def unmarked():
     return notebook
 
 
-USES = "def r1(z, z_E):\n    return -sqrt(sq(z_E[:-1] - z).sum(AXES).min() + EPS) * ONE + length(z - z)"
+USES = (
+    "def r1(z, z_E):\n"
+    "    return -sqrt(sq(z_E[:-1] - z).sum(AXES).min() + EPS) * ONE + length(z - z)"
+)
 HELPERS = [
     "from math import *",
     "sq = lambda x: np.square(x)",
@@ -385,16 +394,11 @@ def test_junit_and_gradescope_hold_the_same_points(class_of_odd_files):
     _, out = class_of_odd_files
     suites = ElementTree.parse(out / "junit.xml").getroot()
     failed = {s.get("name"): int(s.get("failures")) for s in suites}
-    assert (
-        failed["another kernel"] == 0
-        and failed["a cell deleted"] == 1
-        and failed["invalid JSON"] == 5
-    )
+    kinds = ("another kernel", "a cell deleted", "invalid JSON")
+    assert [failed[kind] for kind in kinds] == [0, 1, 5]
     tests = json.loads((out / safe("a cell deleted") / "results.json").read_text())["tests"]
-    assert [(t["name"][:3], t["score"]) for t in tests][:2] == [
-        ("6.1", 0),
-        ("6.2", find("6.2").points),
-    ]
+    first, second = [(t["name"][:3], t["score"]) for t in tests][:2]
+    assert (first, second) == (("6.1", 0), ("6.2", find("6.2").points))
     assert sum(t["max_score"] for t in tests) == FULL
 
 
@@ -405,7 +409,6 @@ def test_a_page_says_what_was_wrong_and_runs_nothing(class_of_odd_files):
 
 
 # The grader itself
-# -------------------------------------------------------------------------------------
 
 
 def test_two_gradings_are_equal_to_the_byte(tmp_path):
@@ -476,15 +479,14 @@ def test_what_breaks_the_grader_costs_one_submission_and_is_told(tmp_path, monke
     assert "ann: NOT GRADED" in capsys.readouterr().err
     assert set(grades(tmp_path / "out")) == {"bob"}
     rows = list(csv.reader((tmp_path / "out" / "class.csv").open()))
-    assert [row[0] for row in rows] == ["submission", "ann", "bob"] and "a bug of ours" in rows[1][
-        -1
-    ]
+    assert [row[0] for row in rows] == ["submission", "ann", "bob"]
+    assert "a bug of ours" in rows[1][-1]
 
 
 @pytest.mark.parametrize(
     "line",
-    ["nowhere", "empty", "class --notebooks 66", "class --notebooks 6,x", "a.zip", "class --out a.zip",
-     "class --out a.zip/x", "no_notebooks"],
+    ["nowhere", "empty", "class --notebooks 66", "class --notebooks 6,x", "a.zip",
+     "class --out a.zip", "class --out a.zip/x", "no_notebooks"],
 )  # fmt: skip
 def test_a_wrong_command_is_one_sentence(tmp_path, capsys, monkeypatch, line):
     monkeypatch.chdir(tmp_path)
@@ -501,7 +503,7 @@ def test_a_flat_folder_is_a_class_unless_its_names_are_those_of_the_course(tmp_p
     (tmp_path / "one").mkdir()
     for path in ("flat/ann.ipynb", "flat/bob.ipynb", "one/06_reward.ipynb"):
         (tmp_path / path).write_text(json.dumps(unmarked()))
-    # inside the class: it is no submission, neither then nor later
+    # Inside the class: it is no submission, neither then nor later.
     out = tmp_path / "flat" / "grades"
     for folder in ("flat", "flat", "one"):
         assert main([str(tmp_path / folder), "--out", str(out), "--notebooks", " 06"]) == 0
@@ -512,11 +514,8 @@ def test_a_flat_folder_is_a_class_unless_its_names_are_those_of_the_course(tmp_p
 
 def test_one_students_marks_and_a_loose_notebook_do_not_stop_the_class(tmp_path):
     strange = copy.deepcopy(SOLVED)
-    for grade_id, source in (
-        ("ex-99-1", "x = 1"),
-        (["ex-6-1"], "y = 1"),
-        ("z", "# Exercise 77.3\nz = 1"),
-    ):
+    marks = (("ex-99-1", "x = 1"), (["ex-6-1"], "y = 1"), ("z", "# Exercise 77.3\nz = 1"))
+    for grade_id, source in marks:
         note = {"nbgrader": {"grade_id": grade_id}}
         strange["cells"].append({"cell_type": "code", "metadata": note, "source": source})
     write(tmp_path / "class", "ann", strange)
@@ -569,9 +568,8 @@ def test_an_answer_that_counts_its_calls_and_remembers_what_it_said_earns_nothin
 
 def test_one_open_case_costs_its_own_checks_only():
     exercise = find("10.4")
-    source = exercise.source.replace(
-        "    if not expert.all():", f"    {STUB}\n    if not expert.all():"
-    )
+    last = "    if not expert.all():"
+    source = exercise.source.replace(last, f"    {STUB}\n{last}")
     with Sandbox() as box:
         result = grading.grade_one(exercise, Answer(source, [], ""), box)
     assert 0 < result.points < result.most and not result.open
@@ -587,20 +585,13 @@ def test_without_either_wall_the_warning_says_that_files_can_be_read(monkeypatch
 def test_without_bubblewrap_there_is_a_warning_and_the_limits_stay(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr("shutil.which", lambda name: None)
     monkeypatch.setattr(sandbox, "WALL", 4)
-    names = [
-        "sleep",
-        "fork bomb, quiet",
-        "a full disk",
-        "opens a socket",
-        "imports the answer",
-        "100 GB",
-    ]
+    names = ["sleep", "fork bomb, quiet", "a full disk", "opens a socket", "imports the answer"]
+    names.append("100 GB")
     names += READERS if has_landlock() else []
     for name in names:
         source = BAD[name][0].replace("CLASS", repr(str(tmp_path / "class")))
         write(tmp_path / "class", name, answered(source))
     assert main([str(tmp_path / "class"), "--out", str(tmp_path / "out"), "--notebooks", "6"]) == 0
     assert "bubblewrap is not installed" in capsys.readouterr().err
-    assert {n: g[:2] for n, g in grades(tmp_path / "out").items()} == {
-        n: (BAD[n][1], REST) for n in names
-    }
+    got = {n: g[:2] for n, g in grades(tmp_path / "out").items()}
+    assert got == {n: (BAD[n][1], REST) for n in names}

@@ -34,8 +34,7 @@ def image(value):
 
 @pytest.fixture(scope="module")
 def by_hand():
-    """x = 1 and y = 2, so c_x = 10, c_y = 21, s_x = 1, s_y = 4, G_X(c_y, s_x) = 22, G_Y(c_x, s_y) =
-    18."""
+    """x = 1, y = 2; c_x = 10, c_y = 21; s_x = 1, s_y = 4; G_X(c_y, s_x) = 22, G_Y(c_x, s_y) = 18"""
     x, y = image(1), image(2)
     losses = generator_losses(Stub(), CRITICS, x, y, swap(Stub(), x, y))
     return {name: loss.item() for name, loss in losses.items()}
@@ -66,8 +65,8 @@ def test_loss_equals_the_sum_done_by_hand(by_hand, name, value):
 
 
 def test_style_loss_compares_styles_of_the_same_domain(by_hand):
-    # The known bug takes E_X^s of the Y translation: |E_X^s(18) - s_x| = 17, |E_Y^s(22) - s_y| =
-    # 20.
+    # The known bug takes E_X^s of the Y translation:
+    # |E_X^s(18) - s_x| = 17, |E_Y^s(22) - s_y| = 20.
     assert (by_hand["L_rec^s_x"], by_hand["L_rec^s_y"]) == (21, 16)
 
 

@@ -1,5 +1,4 @@
-"""The notebooks: the student version is the source without its answers, and the two agree with the
-checks."""
+"""The notebooks: the student version is the source without its answers; both fit the checks."""
 
 import ast
 import os
@@ -56,10 +55,8 @@ def test_a_notebook_has_two_to_five_exercises_each_with_its_check(path):
     for e in exercises:
         task, check = cells[e.grade_id], cells[e.grade_id.replace("ex-", "check-")]
         assert task.source.startswith(f"# Exercise {e.id}\n") and e.name in task.source
-        assert (
-            check.source.startswith(f'check("{e.id}")')
-            and check.metadata.nbgrader.points == e.points
-        )
+        assert check.source.startswith(f'check("{e.id}")')
+        assert check.metadata.nbgrader.points == e.points
 
 
 @by_name
@@ -73,9 +70,8 @@ def test_no_answer_is_left_in_the_student_version(path):
 @pytest.mark.parametrize("path", [p for s in SOURCES for p in (s, NOTEBOOKS / s.name)], ids=str)
 def test_no_outputs_and_no_machines_paths_are_stored(path):
     notebook = nbformat.read(path, 4)
-    assert all(
-        not c.outputs and c.execution_count is None for c in notebook.cells if c.cell_type == "code"
-    )
+    cells = [c for c in notebook.cells if c.cell_type == "code"]
+    assert all(not c.outputs and c.execution_count is None for c in cells)
     assert not re.search(r"/home/|/root/|/tmp/|/work/|/Users/", path.read_text())
     assert "/" not in str(dict(notebook.metadata))
 
@@ -101,17 +97,8 @@ def test_it_is_python_and_asks_a_question_first(path):
 @pytest.mark.slow
 @by_name
 def test_a_solution_runs_headless_within_two_minutes(path, tmp_path):
-    command = [
-        sys.executable,
-        "-m",
-        "jupyter",
-        "nbconvert",
-        "--to",
-        "notebook",
-        "--execute",
-        str(path),
-    ]
-    where = ["--output-dir", str(tmp_path)]
+    command = [sys.executable, "-m", "jupyter", "nbconvert", "--to", "notebook", "--execute"]
+    where = [str(path), "--output-dir", str(tmp_path)]
     subprocess.run([*command, *where], check=True, timeout=120, env=os.environ | {"LBW_FAST": "1"})
 
 
@@ -123,10 +110,8 @@ def test_the_student_version_stops_at_its_first_exercise_with_one_sentence(path)
     first = kinds.index(of(path)[0].grade_id)
     assert next(k for k in kinds[first + 1 :] if k) == of(path)[0].grade_id.replace("ex-", "check-")
     space = {}
-    exec(
-        f"import torch, numpy as np\nfrom tests.grade import check\n{notebook.cells[first].source}",
-        space,
-    )
+    exec("import torch, numpy as np\nfrom tests.grade import check", space)
+    exec(notebook.cells[first].source, space)
     with pytest.raises(StillOpen, match="still open") as stop:
         exec(f'check("{of(path)[0].id}")', space)
     assert len(stop.value._render_traceback_()) == 1
@@ -157,9 +142,8 @@ def test_a_page_of_the_book_needs_no_network_and_no_script_for_its_equations():
     notebook = nbformat.read(source, as_version=4)
     notebook.cells = [c for c in notebook.cells if c.cell_type == "markdown"]
     stream = nbformat.v4.new_output("stream", text="pybullet build time: Jan 29 2025\n")
-    bar = nbformat.v4.new_output(
-        "stream", name="stderr", text="\rpolicy 0%\rpolicy 50%\rpolicy 100%\n"
-    )
+    progress = "\rpolicy 0%\rpolicy 50%\rpolicy 100%\n"
+    bar = nbformat.v4.new_output("stream", name="stderr", text=progress)
     notebook.cells.append(nbformat.v4.new_code_cell("import pybullet", outputs=[stream, bar]))
     equations = sum(not m[1] for c in notebook.cells for m in MATH.finditer(c.source))
     html = page(notebook, source)
@@ -167,9 +151,8 @@ def test_a_page_of_the_book_needs_no_network_and_no_script_for_its_equations():
     assert html.count("<math") == equations > 10
     assert "EQUATION" not in html and "build time" not in html
     assert "policy 100%" in html and "policy 50%" not in html
-    assert all(
-        f'href="{name}.html"' in html for name in ("index", SOURCES[0].stem, SOURCES[2].stem)
-    )
+    neighbours = ("index", SOURCES[0].stem, SOURCES[2].stem)
+    assert all(f'href="{name}.html"' in html for name in neighbours)
     assert 'id="plain"' in html
 
 

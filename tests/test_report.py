@@ -12,7 +12,10 @@ from PIL import Image
 from lbw_minimal import pictures, report
 
 T, N, K = 4, 9, 3
-SCENE = "<!DOCTYPE html><html><body><p title=\"a & b\">scene</p><script>'<b>' && 1</script></body></html>"
+SCENE = (
+    '<!DOCTYPE html><html><body><p title="a & b">scene</p>'
+    "<script>'<b>' && 1</script></body></html>"
+)
 
 
 def frames(n):
@@ -26,6 +29,7 @@ def frames(n):
 def example():
     """What a run knows in the end."""
     z = np.random.default_rng(0).uniform(-1, 1, (N, K, 2))
+    tip_x, object_y = {"r2": 0.987, "px": 0.42}, {"r2": None, "px": 0.1}
     return {
         "task": "push", "demo": frames(N), "translated": frames(N), "z_demo": z,
         "log": [{"step": 50 * i, "return": -1.0 * i, "success": i > 2} for i in range(1, 6)],
@@ -34,9 +38,11 @@ def example():
             "success": {"rate": 0.9, "low": 0.596, "high": 0.982, "episodes": 10},
             "episodes": [{"success": i != 3, "first_success": 2} for i in range(10)],
             "stages": {"translation": 600.0, "policy": 60.0},
-            "perception": {"robot": {"tip_x": {"r2": 0.987, "px": 0.42}, "object_y": {"r2": None, "px": 0.1}},
-                           "keypoint_std": [0.25, 0.1099999]},
-            "settings": {"seed": 7, "reward": "literal", "recipe": {"K": 5}}, "machine": "two cores",
+            "perception": {
+                "robot": {"tip_x": tip_x, "object_y": object_y}, "keypoint_std": [0.25, 0.1099999],
+            },
+            "settings": {"seed": 7, "reward": "literal", "recipe": {"K": 5}},
+            "machine": "two cores",
         },
         "scene_html": SCENE, "command": "python -m tasks push --seed 7",
     }  # fmt: skip
@@ -68,8 +74,7 @@ def titles(page):
 
 
 def test_wilson_gives_the_published_values():
-    """10 of 10 and 5 of 10 by hand: n / (n + z^2), and 1/2 -+ z / (2 sqrt(n + z^2)), z^2 =
-    3.8415."""
+    """By hand, z^2 = 3.8415. 10 of 10: n / (n + z^2); 5 of 10: 1/2 -+ z / (2 sqrt(n + z^2))."""
     np.testing.assert_allclose(report.wilson(10, 10), (10 / 13.8415, 1), atol=1e-5)
     np.testing.assert_allclose(report.wilson(5, 10), (0.236593, 0.763407), atol=1e-5)
 
@@ -86,8 +91,7 @@ def test_wilson_refuses_impossible_counts(wins, n):
 
 
 def test_a_keypoint_is_drawn_on_the_pixel_it_names():
-    """z = (-1 + 2 (20.5) / 84, ...) is the centre of pixel 20: columns 80 to 83 of the enlarged
-    frame."""
+    """z = (-1 + 2 (20.5) / 84, ...) is the centre of pixel 20: columns 80 to 83 when enlarged."""
     z = np.array([[[2 * 20.5 / 84 - 1, 2 * 60.5 / 84 - 1]]])
     image = pictures.draw_keypoints(np.zeros((1, 84, 84, 3), np.uint8), z, scale=3)[0]
     rows, columns = np.nonzero(image.any(-1))
@@ -173,9 +177,8 @@ def test_the_page_loads_nothing_from_elsewhere(page):
 
 
 def test_the_page_names_no_path_of_the_machine(page, folder):
-    decoded = [
-        base64.b64decode(d).decode(errors="ignore") for d in re.findall(r"base64,([^\"]*)", page)
-    ]
+    hidden = re.findall(r"base64,([^\"]*)", page)
+    decoded = [base64.b64decode(d).decode(errors="ignore") for d in hidden]
     assert not [text for text in (page, *decoded) if str(folder) in text or "/lib/python" in text]
 
 
@@ -233,11 +236,8 @@ def test_a_smoke_run_says_so(tmp_path, page, run):
 
 
 def test_text_of_the_run_cannot_break_the_page(tmp_path, run):
-    run |= {
-        "task": "<script>x",
-        "command": "a & b < c",
-        "metrics": {"settings": {"video": '"><script>y'}},
-    }
+    run |= {"task": "<script>x", "command": "a & b < c"}
+    run |= {"metrics": {"settings": {"video": '"><script>y'}}}
     page = written(tmp_path, run)
     assert "<script>x" not in page and "<script>y" not in page and "a &amp; b &lt; c" in page
 

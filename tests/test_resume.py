@@ -37,8 +37,7 @@ def flat(tree, name=""):
 
 @pytest.mark.slow
 def test_fifteen_kills_change_nothing(tmp_path):
-    """Five SIGKILLs at random moments of each stage; the weights equal those of an undisturbed
-    run."""
+    """Five SIGKILLs at random moments of each stage; weights equal those of an undisturbed run."""
     whole, killed = tmp_path / "whole", tmp_path / "killed"
     assert start(whole).wait() == 0
     dice, options = random.Random(0), ()

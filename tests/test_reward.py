@@ -1,5 +1,4 @@
-"""What Eq. 8-10 pay, computed by hand, and what the mended form pays for on a toy of the push
-task."""
+"""What Eq. 8-10 pay, computed by hand, and what the mended form pays for on a toy push task."""
 
 from itertools import pairwise
 

@@ -1,5 +1,4 @@
-"""All scenes, both arms: the mirror in the browser stands where PyBullet has it, and the picture is
-whole."""
+"""All scenes, both arms: the browser's mirror stands as in PyBullet, and the picture is whole."""
 
 import numpy as np
 import pytest
@@ -17,8 +16,7 @@ def make(name, arm):
 
 
 def poses(page):
-    """What the page tells the browser of its links: {path: 4x4} and, of those that move, {path: (T,
-    7)}."""
+    """What the page says of its links: {path: 4x4} and, of those that move, {path: (T, 7)}."""
     told = commands(page)
     still = {
         c["path"]: np.reshape(c["matrix"], (4, 4)).T for c in told if c["type"] == "set_transform"
@@ -69,8 +67,7 @@ def frame(p, body, link):
 
 @pytest.mark.parametrize(("name", "arm"), SCENES)
 def test_painting_the_scenery_once_changes_no_pixel(name, arm, monkeypatch):
-    """The same episode rendered with everything in the scene: the depth keeps what is in front in
-    front."""
+    """As if everything were in the scene: the depth keeps what is in front in front."""
     fast = make(name, arm)
     monkeypatch.setattr(World, "paint", lambda world: None)
     full = make(name, arm)

@@ -23,8 +23,8 @@ def finish(path, wins, episodes=10, **more):
     scores = {n: {"r2": 0.99, "px": 1.0} for n in ("tip_x", "tip_y", "object_x")}
     scores["object_y"] = {"r2": None, "px": 0.1}
     metrics = {
-        "episodes": rows, "success": {}, "stages": {"translation": 300, "policy": 60}, "memory_mb": 800,
-        "settings": {"recipe": {"policy_steps": 10_000}},
+        "episodes": rows, "success": {}, "stages": {"translation": 300, "policy": 60},
+        "memory_mb": 800, "settings": {"recipe": {"policy_steps": 10_000}},
         "perception": {"robot": scores, "translated": scores},
     }  # fmt: skip
     (path / "metrics.json").write_text(json.dumps(metrics | more))

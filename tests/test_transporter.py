@@ -11,15 +11,14 @@ TRAINING = 60  # iterations of the one training that several claims share, a sec
 
 
 def squares(T=240, seed=0):
-    """A red and a blue square, 14 pixels wide, on separate smooth paths; true centres (T, 2, 2) in
-    pixels."""
+    """A red and a blue square, 14 px wide, each on a smooth path; true centres (T, 2, 2) in px."""
     rng = np.random.default_rng(seed)
     phase, t = rng.uniform(0, 2 * np.pi, 4), np.arange(T)
     # Frequencies without a common divisor: nothing about one square can be read off the other.
     x_red, y_red = 42 + 26 * np.sin(0.131 * t + phase[0]), 22 + 10 * np.sin(0.171 * t + phase[1])
     x_blue, y_blue = 42 + 26 * np.sin(0.113 * t + phase[2]), 60 + 10 * np.sin(0.097 * t + phase[3])
-    # (T, 2, 2)
-    centres = np.stack([np.stack([x_red, y_red], 1), np.stack([x_blue, y_blue], 1)], 1).round()
+    red, blue = np.stack([x_red, y_red], 1), np.stack([x_blue, y_blue], 1)
+    centres = np.stack([red, blue], 1).round()  # (T, 2, 2)
     frames = np.full((T, 84, 84, 3), 120, np.uint8)
     for frame, pair in zip(frames, centres.astype(int), strict=True):
         for (x, y), colour in zip(pair, [(200, 40, 40), (40, 60, 200)], strict=True):

@@ -30,13 +30,13 @@ def client():
 def low_poly_panda(client, folder):
     text = PANDA.read_text().replace("meshes/visual", "meshes/collision")
     (folder / "arm.urdf").write_text(text.replace("package://", f"{PANDA.parent}/"))
-    return p.loadURDF(str(folder / "arm.urdf"), (0.1, 0.2, 0.3), p.getQuaternionFromEuler((0.1, 0.2, 0.3)),
-                      useFixedBase=True, physicsClientId=client)  # fmt: skip
+    turn = p.getQuaternionFromEuler((0.1, 0.2, 0.3))
+    path = str(folder / "arm.urdf")
+    return p.loadURDF(path, (0.1, 0.2, 0.3), turn, useFixedBase=True, physicsClientId=client)
 
 
 def primitives(client):
-    """A base and a hinged link, both with two shapes apart from their centres of mass, all kinds of
-    shape."""
+    """A base and a hinged link of two shapes each, apart from their centres of mass; all kinds."""
     p.setGravity(0, 0, -9.81, client)
     turn = p.getQuaternionFromEuler
 
@@ -56,10 +56,12 @@ def primitives(client):
         visualFrameOrientations=[turn((0, np.pi / 2, 0.2)), [0, 0, 0, 1]],
     )  # fmt: skip
     return p.createMultiBody(
-        1.0, -1, base, (0.2, 0.1, 0.8), turn((0.2, 0.4, 0.1)), (0.05, 0.02, 0.1), turn((0.3, 0, 0.2)),
+        1.0, -1, base, (0.2, 0.1, 0.8), turn((0.2, 0.4, 0.1)),
+        (0.05, 0.02, 0.1), turn((0.3, 0, 0.2)),
         linkMasses=[0.5], linkCollisionShapeIndices=[-1], linkVisualShapeIndices=[link],
         linkPositions=[[0.2, 0, 0.1]], linkOrientations=[turn((0, 0.3, 0))],
-        linkInertialFramePositions=[[0.1, 0.03, 0]], linkInertialFrameOrientations=[turn((0, 0.2, 0.7))],
+        linkInertialFramePositions=[[0.1, 0.03, 0]],
+        linkInertialFrameOrientations=[turn((0, 0.2, 0.7))],
         linkParentIndices=[0], linkJointTypes=[p.JOINT_REVOLUTE], linkJointAxis=[[0, 1, 0]],
         physicsClientId=client,
     )  # fmt: skip
@@ -87,11 +89,13 @@ def played(page, frame):
         for part in c.get("animations", []):
             at = {t["name"]: t["keys"][frame]["value"] for t in part["clip"]["tracks"]}
             fixed[part["path"]] = transform(at[".position"], at[".quaternion"])
-    return [
-        (c["path"], c["object"]["geometries"][0], fixed[c["path"].rsplit("/", 1)[0]] @ fixed[c["path"]],
-         c["object"]["materials"][0])
-        for c in told if c["type"] == "set_object"
-    ]  # fmt: skip
+    drawn = []
+    for c in told:
+        if c["type"] == "set_object":
+            path, thing = c["path"], c["object"]
+            pose = fixed[path.rsplit("/", 1)[0]] @ fixed[path]
+            drawn.append((path, thing["geometries"][0], pose, thing["materials"][0]))
+    return drawn
 
 
 def depth(client):

@@ -62,8 +62,7 @@ class Film(gym.Env):
 
 
 def play(env, steps=20):
-    """Observations (steps + 1, S) and rewards (steps,) of an episode under actions that do not
-    matter."""
+    """Observations (steps + 1, S), rewards (steps,) of an episode; the actions do not matter."""
     observations, rewards = [env.reset(seed=0)[0]], []
     for _ in range(steps):
         observation, r, *_ = env.step(np.zeros(3, np.float32))
@@ -105,8 +104,7 @@ def test_the_wrapper_pays_what_the_reward_says_of_the_two_frames(reward):
 
 
 def test_observation_and_reward_are_functions_of_the_frames(reward):
-    """Another world with the same pictures, closed to inspection and paying 1,000 a step: no
-    difference."""
+    """Another world with the same pictures, closed and paying 1,000 a step: no difference."""
     frames = demonstration()
     poor, rich = play(wrap(Film(frames), reward)), play(wrap(Film(frames, reward=1000.0), reward))
     assert (poor[0] == rich[0]).all() and (poor[1] == rich[1]).all()

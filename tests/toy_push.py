@@ -9,7 +9,7 @@ import gymnasium as gym
 import numpy as np
 
 BASE, START, PUCK, GOAL = np.array([-0.9, -0.3]), np.array([-0.5, 0.0]), 0.0, 0.55
-# all in keypoint units, 1 = half the image
+# In keypoint units: 1 is half the image.
 TABLE, HALF_PUCK, HALF_GRIPPER, STEP = 0.6, 0.1, 0.06, 0.08
 COLOURS = (60, 120, 180, 240)  # elbow, wrist, gripper, puck
 
@@ -63,8 +63,7 @@ class ToyPush(gym.Env):
 
 
 def detect(frames):
-    """Frames (B, 84, 84, 3) uint8 -> keypoints (B, 4, 2), the parts' centres; a hidden part gives
-    (0, 0)."""
+    """Frames (B, 84, 84, 3) uint8 -> the parts' centres (B, 4, 2); a hidden part gives (0, 0)."""
     z = np.zeros((len(frames), 4, 2), np.float32)
     for b, image in enumerate(frames[..., 0]):
         for k, colour in enumerate(COLOURS):
@@ -75,8 +74,7 @@ def detect(frames):
 
 
 def follow(env, waypoints):
-    """Frames of a scripted arm that visits every (x, y) at `speed` and rests there for `pause`
-    frames."""
+    """Frames of a scripted arm: visits every (x, y) at `speed`, rests there for `pause` frames."""
     frames = [env.reset(seed=0)[0]]
     for x, y, speed, pause in waypoints:
         for _ in range(60):
@@ -91,8 +89,7 @@ def follow(env, waypoints):
 
 
 def demonstration(goal=GOAL):
-    """Frames of a slow 'human': rests, swings behind the puck, rests, pushes it to the goal,
-    rests."""
+    """Frames of a slow 'human': rests, swings behind the puck, rests, pushes it home, rests."""
     env = ToyPush()
     reach = HALF_PUCK + HALF_GRIPPER
     behind, end = (-0.26, 0.5, 0.35, 4), (goal - reach, 0.5, 0.5, 3)

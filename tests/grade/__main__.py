@@ -71,14 +71,12 @@ def main(argv=None) -> int:
     def job(entry):
         try:
             done = grade_once(entry, ids, args.out, args.gradescope, args.seed)
-        # the rest of the class goes on; without a result.json this is tried again
-        except Exception as e:
+        except Exception as e:  # the class goes on; without a result.json this is tried again
             traceback.print_exc()
             why = f"NOT GRADED, {type(e).__name__}: {e}"
             print(f"{entry.name}: {why}", file=sys.stderr)
-            return record(entry, [nothing(everything()[id], why) for id in ids], [why]) | {
-                "failed": True
-            }
+            results = [nothing(everything()[id], why) for id in ids]
+            return record(entry, results, [why]) | {"failed": True}
         print(f"{entry.name}: {done['points']:g} of {done['most']:g}", flush=True)
         return done
 
@@ -104,9 +102,8 @@ def submissions(folder: Path, out: Path) -> list[Path]:
     if not folder.is_dir() and folder.suffix != ".ipynb":
         raise ValueError(f"{folder}: neither a folder nor a notebook; unpack an archive first")
     inside = {path.relative_to(folder) for path in notebooks(folder)}
-    if folder.is_file() or (
-        inside and inside <= {path.relative_to(RELEASED) for path in RELEASED.glob("*")}
-    ):
+    released = {path.relative_to(RELEASED) for path in RELEASED.glob("*")}
+    if folder.is_file() or (inside and inside <= released):
         print(f"{folder} is graded as one submission")
         return [folder]
     found = sorted(p for p in folder.iterdir() if not hidden(p) and p.resolve() != out.resolve())
@@ -116,8 +113,7 @@ def submissions(folder: Path, out: Path) -> list[Path]:
 
 
 def wanted(numbers: str | None, entries: list[Path]) -> list[str]:
-    """The exercises of notebooks by their numbers, "5" or "5,6"; else of all that the class handed
-    in.
+    """The exercises of notebooks by their numbers, "5" or "5,6"; else of all that were handed in.
 
     Raises ValueError where there are none.
     """
@@ -134,8 +130,7 @@ def wanted(numbers: str | None, entries: list[Path]) -> list[str]:
 
 
 def hidden(entry: Path) -> bool:
-    """Whether an entry of the class folder is the system's, such as .DS_Store, and nobody's
-    work."""
+    """Whether an entry of the class folder is the system's, such as .DS_Store, not a student's."""
     return entry.name[0] == "." and not notebooks(entry)
 
 
@@ -195,9 +190,8 @@ def grade_one(exercise: Exercise, given: Answer, box: Sandbox, seed: int = 0) ->
         failed = box.open(exercise, given.source, given.helpers)
         if failed is not None:
             text = getattr(failed, "text", "")
-            return nothing(
-                exercise, f"the cell does not run: {failed}: {text}" if text else f"{failed}"
-            )
+            why = f"the cell does not run: {failed}: {text}" if text else f"{failed}"
+            return nothing(exercise, why)
         return judge(exercise, box.call, seed, renew)
     except Lost as e:
         return nothing(exercise, str(e))
@@ -206,8 +200,7 @@ def grade_one(exercise: Exercise, given: Answer, box: Sandbox, seed: int = 0) ->
 
 
 def grade_once(entry: Path, ids: list[str], out: Path, gradescope: bool, seed: int) -> dict:
-    """Grade a submission and write its pages, unless that has been done for the same files and
-    checks."""
+    """Grade a submission and write its pages, unless done before for the same files and checks."""
     digest = fingerprint(entry, ids, seed)
     folder = out / safe(entry.name)
     path = folder / "result.json"
@@ -216,12 +209,11 @@ def grade_once(entry: Path, ids: list[str], out: Path, gradescope: bool, seed: i
         done = record(entry, *grade(entry, ids, seed)) | {"digest": digest}
         folder.mkdir(parents=True, exist_ok=True)
         write_atomic(folder / "feedback.html", feedback.page(done))
-        # last: it says that all the rest is there
+        # Last: it says that all the rest is there.
         write_atomic(path, json.dumps(done, indent=1) + "\n")
     if gradescope:
-        write_atomic(
-            folder / "results.json", json.dumps(feedback.gradescope(done), indent=1) + "\n"
-        )
+        text = json.dumps(feedback.gradescope(done), indent=1) + "\n"
+        write_atomic(folder / "results.json", text)
     return done
 
 
@@ -237,8 +229,7 @@ def record(entry: Path, results: list[Result], notes: list[str]) -> dict:
 
 
 def safe(name: str) -> str:
-    """A file name for a submission's results, unique and harmless whatever the submission is
-    called."""
+    """A file name for a submission's results, unique and harmless whatever its own name is."""
     plain = re.sub(r"[^A-Za-z0-9_-]+", "_", name.removesuffix(".ipynb"))[:60].strip("_")
     return f"{plain}-{hashlib.sha256(name.encode(errors='surrogateescape')).hexdigest()[:8]}"
 
@@ -262,12 +253,11 @@ def table(grades: list[dict], ids: list[str]) -> str:
     rows.writerow(["submission", "points", "of", *ids, "notes"])
     for g in grades:
         points = {e["id"]: f"{e['points']:g}" for e in g["exercises"]}
-        # no formula
-        name = g["submission"] if g["submission"][0] not in "=+-@" else "'" + g["submission"]
-        notes = "; ".join(g["notes"])
-        rows.writerow(
-            [name, f"{g['points']:g}", f"{g['most']:g}", *(points[id] for id in ids), notes]
-        )
+        name = g["submission"]
+        if name[0] in "=+-@":  # a spreadsheet would take it for a formula
+            name = "'" + name
+        totals = (f"{g['points']:g}", f"{g['most']:g}")
+        rows.writerow([name, *totals, *(points[id] for id in ids), "; ".join(g["notes"])])
     return text.getvalue()
 
 

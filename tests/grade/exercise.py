@@ -6,9 +6,8 @@ A file in `tests/grade/exercises/` holds the exercises of one notebook:
     def r1(z, z_E):
         return -np.linalg.norm((z_E[:-1] - z).reshape(len(z_E) - 1, -1), axis=1).min()
 
-    r1.check("random keypoints", lambda rng: (rng.normal(size=(5, 2)), rng.normal(size=(9, 5, 2))),
-    points=2) r1.mistake("In Eq. 9 p ends at N - 1: your minimum includes the last frame.",
-    "z_E[:-1]", "z_E")
+    r1.check("random", lambda rng: (rng.normal(size=(5, 2)), rng.normal(size=(9, 5, 2))), points=2)
+    r1.mistake("In Eq. 9 p ends at N - 1: yours includes the last frame.", "z_E[:-1]", "z_E")
 
 The decorated code is the reference; a mistake is the reference with a piece of its text replaced. A
 wrong answer that equals a mistake's gets the mistake's hint. numpy as np, torch, F, nn and math are
@@ -36,8 +35,7 @@ TRIALS = 3  # random inputs a check
 
 @dataclass
 class Check:
-    """`inputs(rng)` makes the arguments; the answer has to equal the reference's within the
-    tolerances.
+    """`inputs(rng)` makes the arguments; the answer has to equal the reference's within tolerances.
 
     verify(got, args) judges instead, where many answers are right: it returns a sentence, or None
     if all is well.
@@ -89,8 +87,10 @@ class Exercise:
         self.checks.append(Check(label, inputs, points, atol, rtol, trials, verify))
 
     def mistake(self, hint: str, *edits: str) -> None:
-        """Add a mistake: the reference with `edits` old, new, old, new ... replaced. Raises
-        ValueError."""
+        """Add a mistake: the reference with `edits`, old, new, old, new ..., replaced.
+
+        Raises ValueError if an old piece is not in the reference.
+        """
         pairs = list(zip(edits[::2], edits[1::2], strict=True))
         missing = [old for old, _ in pairs if old not in self.source]
         if missing:
@@ -192,11 +192,9 @@ def different(got, want, check: Check) -> str | None:
             if message := different(got[key], want[key], check):
                 return f"{key}: {message}"
         return None
-    return (
-        None
-        if type(got) is type(want) and got == want
-        else f"it returns {got!r:.60}; expected {want!r:.60}"
-    )
+    if type(got) is type(want) and got == want:
+        return None
+    return f"it returns {got!r:.60}; expected {want!r:.60}"
 
 
 def _is_number(x) -> bool:
@@ -217,9 +215,9 @@ def _different_numbers(got, want, check):
     got, want = np.asarray(got), np.asarray(want)
     if got.shape != want.shape:
         return f"it has shape {got.shape}; expected {want.shape}"
-    if (got.dtype.kind == "b") != (want.dtype.kind == "b") or (want.dtype.kind in "iu") > (
-        got.dtype.kind in "iu"
-    ):
+    truth = [x.dtype.kind == "b" for x in (got, want)]
+    whole = [x.dtype.kind in "iu" for x in (got, want)]
+    if truth[0] != truth[1] or (whole[1] and not whole[0]):
         return f"its values are {got.dtype}; expected {want.dtype}"
     if not np.isfinite(got).all() and np.isfinite(want).all():
         return "it contains NaN or infinity"

@@ -8,8 +8,10 @@ from xml.etree import ElementTree
 from tests.grade.judge import Outcome, Result
 
 CSS = """
-body { font: 16px/1.5 system-ui, sans-serif; max-width: 46em; margin: 2em auto; padding: 0 1em; color: #222 }
-h2 { font-size: 1.1em; margin: 1.6em 0 .2em } .points { float: right } ul { list-style: none; padding: 0 }
+body { font: 16px/1.5 system-ui, sans-serif; max-width: 46em; margin: 2em auto; padding: 0 1em;
+  color: #222 }
+h2 { font-size: 1.1em; margin: 1.6em 0 .2em } .points { float: right }
+ul { list-style: none; padding: 0 }
 li { padding: .3em .6em; border-left: 4px solid; margin: .3em 0; background: #f6f6f6 }
 .ok { border-color: #0072b2 } .wrong { border-color: #d55e00 } .hint { display: block; color: #444 }
 """
@@ -31,13 +33,15 @@ def page(done: dict) -> str:
             state = "wrong" if o["message"] else "ok"
             mark = f"{o['points']:g}/{o['most']:g}"
             items.append(f'<li class="{state}">{mark} {escape(o["label"])}{hint}</li>')
-        head = f'<span class="points">{e["points"]:g} / {e["most"]:g}</span>{e["id"]} {escape(e["title"])}'
-        parts.append(f"<h2>{head}</h2><ul>{''.join(items)}</ul>")
+        points = f'<span class="points">{e["points"]:g} / {e["most"]:g}</span>'
+        head = f"<h2>{points}{e['id']} {escape(e['title'])}</h2>"
+        parts.append(f"{head}<ul>{''.join(items)}</ul>")
     notes = "".join(f"<p>{escape(note)}</p>" for note in done["notes"])
     name = escape(done["submission"].encode(errors="replace").decode())
     return (
-        f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{name}</title><style>{CSS}</style>'
-        f"<h1>{name}: {done['points']:g} of {done['most']:g} points</h1>{notes}{''.join(parts)}</html>\n"
+        f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{name}</title>'
+        f"<style>{CSS}</style><h1>{name}: {done['points']:g} of {done['most']:g} points</h1>"
+        f"{notes}{''.join(parts)}</html>\n"
     )
 
 

@@ -52,9 +52,8 @@ class Result:
         for o in self.outcomes:
             note = f": {o.message}" if o.message and o.message not in said else ""
             said.add(o.message)
-            lines.append(
-                f"{'ok   ' if not o.message else 'wrong'} {o.points:g}/{o.most:g}  {o.label}{note}"
-            )
+            mark = "wrong" if o.message else "ok   "
+            lines.append(f"{mark} {o.points:g}/{o.most:g}  {o.label}{note}")
         return lines
 
 
@@ -94,18 +93,14 @@ def judge(exercise: Exercise, call, seed: int = 0, renew=None) -> Result:
             answers.append(got)
             truths.append(want)
             message = _message(check, got, want, args)
-            hints = (
-                [h for h, wrong in mistakes if _same(check, got, wrong(args), want)]
-                if message
-                else []
-            )
-            if not message and changed:
+            if message:
+                hints = [h for h, wrong in mistakes if _same(check, got, wrong(args), want)]
+            elif changed:
                 message = "it changes its inputs: work on a copy"
             if trial == 0:
                 known.append((args, got))
-        result.outcomes.append(
-            Outcome(check.label, 0 if message else check.points, check.points, message)
-        )
+        points = 0 if message else check.points
+        result.outcomes.append(Outcome(check.label, points, check.points, message))
         guesses.append(hints)
     if all(o.message == UNDONE for o in result.outcomes):
         return nothing(exercise, UNDONE, open=True)
@@ -117,10 +112,10 @@ def judge(exercise: Exercise, call, seed: int = 0, renew=None) -> Result:
         likely = [h for h in hints if 2 * votes[h] >= wrong]
         outcome.message = max(likely, key=votes.get, default=outcome.message)
     if any(o.points for o in result.outcomes) and not lost:
-        same = _all_same(answers) and not _all_same(truths)
-        message = (
-            "it returns the same, whatever it is given" if same else _repeat(known, call, renew)
-        )
+        if _all_same(answers) and not _all_same(truths):
+            message = "it returns the same, whatever it is given"
+        else:
+            message = _repeat(known, call, renew)
         if message:
             for o in result.outcomes:
                 o.points, o.message = 0, o.message or message
@@ -140,16 +135,15 @@ def _message(check: Check, got, want, args) -> str:
 
 def _same(check: Check, got, theirs, want) -> bool:
     """Whether the answer is that of a mistake, and not right."""
-    if type(theirs) is Other or (
-        type(theirs) is Raised and theirs.text != getattr(got, "text", None)
-    ):
+    if type(theirs) is Other:
+        return False
+    if type(theirs) is Raised and theirs.text != getattr(got, "text", None):
         return False
     return not different(got, theirs, check) and bool(different(want, theirs, check))
 
 
 EXACT = Check("", lambda rng: (), 0, 1e-6, 1e-6, 1, None)
-# as a check, where it names no tolerances
-LOOSE = Check("", lambda rng: (), 0, 1e-5, 1e-4, 1, None)
+LOOSE = Check("", lambda rng: (), 0, 1e-5, 1e-4, 1, None)  # as a check that names no tolerances
 
 
 def _all_same(values) -> bool:
@@ -178,6 +172,6 @@ def _repeat(known, call, renew) -> str:
 def _agrees(pair, call) -> bool:
     args, before = pair
     again, _ = call(args)
-    return not different(again, before, EXACT) or (
-        type(again) is type(before) is Other and again == before
-    )
+    if type(again) is type(before) is Other and again == before:
+        return True
+    return not different(again, before, EXACT)

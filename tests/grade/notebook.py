@@ -16,8 +16,7 @@ from tests.grade.sandbox import WALL
 
 
 class StillOpen(Exception):
-    """The notebook has come to an exercise that is not done; shown as one sentence, without a
-    traceback."""
+    """The notebook has come to an exercise that is not done: one sentence, no traceback."""
 
     def _render_traceback_(self):
         return [str(self)]
@@ -31,8 +30,7 @@ class Points(float):
 
 
 def check(id: str, seed: int = 0) -> Points:
-    """Check exercise `id` ("6.1"), as defined in the calling notebook; print what is right and what
-    is not.
+    """Check exercise `id` ("6.1") of the calling notebook; print what is right and what is not.
 
     seed: other random inputs. Returns the points. Raises StillOpen, a quiet stop, while the
     exercise is open.
@@ -48,7 +46,8 @@ def check(id: str, seed: int = 0) -> Points:
     result = judge(exercise, here(exercise, space), seed)
     if result.open:
         raise StillOpen(
-            f"Exercise {id} ({exercise.title}) is still open. Fill in its cell and run on from there."
+            f"Exercise {id} ({exercise.title}) is still open. "
+            "Fill in its cell and run on from there."
         )
     print(report(result))
     return Points(result.points)

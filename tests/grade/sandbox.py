@@ -30,7 +30,10 @@ DEVICES = ("/dev/null", "/dev/zero", "/dev/random", "/dev/urandom")
 MEMORY = 2 << 30  # bytes a student's code may take
 CPU = 10  # s of processor time for one exercise
 WALL = 15  # s for one call, asleep or not
-ENDED = f"the process ended: an exit, a crash, or more than {CPU} s of processor time (an endless loop?)"
+ENDED = (
+    f"the process ended: an exit, a crash, or more than {CPU} s of processor time "
+    "(an endless loop?)"
+)
 START = 120  # s for the libraries to load on a busy machine
 
 
@@ -45,38 +48,33 @@ def warning() -> str:
     files = "the kernel alone (Landlock) keeps this machine's files from the code of submissions"
     if not has_landlock():
         files = "the code of submissions can READ THE FILES of this machine, solutions included"
-    return f"bubblewrap is not installed: {files}. Install it before you grade (Debian: apt install bubblewrap)"
+    return (
+        f"bubblewrap is not installed: {files}. "
+        "Install it before you grade (Debian: apt install bubblewrap)"
+    )
 
 
 def command(fd: int) -> list[str]:
     """How to start the worker: inside bubblewrap where there is one."""
     homes = {Path(p).resolve() for p in (sys.prefix, sys.base_prefix)} | {Path(sys.prefix), CELL}
     homes = sorted(map(str, homes))
-    python = [
-        sys.executable,
-        "-I",
-        "-B",
-        str(CELL / "worker.py"),
-        str(fd),
-        *SYSTEM,
-        *DEVICES,
-        *homes,
-    ]
+    readable = [*SYSTEM, *DEVICES, *homes]
+    python = [sys.executable, "-I", "-B", str(CELL / "worker.py"), str(fd), *readable]
     bwrap = shutil.which("bwrap")
     if not bwrap:
         return python
     binds = [x for path in SYSTEM for x in ("--ro-bind-try", path, path)]
     binds += [x for path in homes for x in ("--ro-bind", path, path)]
     return [
-        bwrap, "--unshare-all", "--die-with-parent", "--new-session", "--clearenv", "--cap-drop", "ALL",
-        "--size", str(8 << 20), "--tmpfs", "/tmp", *binds, "--proc", "/proc", "--dev", "/dev", "--setenv",
-        "OMP_NUM_THREADS", "1", "--chdir", "/tmp", *python,
+        bwrap, "--unshare-all", "--die-with-parent", "--new-session", "--clearenv",
+        "--cap-drop", "ALL", "--size", str(8 << 20), "--tmpfs", "/tmp", *binds,
+        "--proc", "/proc", "--dev", "/dev", "--setenv", "OMP_NUM_THREADS", "1",
+        "--chdir", "/tmp", *python,
     ]  # fmt: skip
 
 
 class Sandbox:
-    """One worker process; `open` an exercise, `call` it, `close` it. It is started again when
-    lost."""
+    """One worker process: `open` an exercise, `call` it, `close` it. When lost it starts again."""
 
     def __init__(self):
         self.process = self.channel = None
@@ -193,9 +191,8 @@ def _descendants(pid: int) -> list[int]:
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit():
             try:
-                parents[int(entry.name)] = int(
-                    (entry / "stat").read_text().rsplit(")", 1)[1].split()[1]
-                )
+                after_the_name = (entry / "stat").read_text().rsplit(")", 1)[1]
+                parents[int(entry.name)] = int(after_the_name.split()[1])
             except (OSError, IndexError, ValueError):
                 continue
     found = [pid]

@@ -25,11 +25,11 @@ class Unreadable(Exception):
 
 @dataclass
 class Cell:
-    """A code cell. exercise: the id of the one it is marked for, by grade id or its first line; or
-    "".
+    """A code cell.
 
-    body: its top-level statements, but for functions and classes as they were handed out; none if
-    it does not parse. defines: the names these define.
+    exercise: the id of the one it is marked for, by grade id or its first line; or "". body: its
+    top-level statements, but for functions and classes as they were handed out; none if it does not
+    parse. defines: the names these define.
     """
 
     source: str
@@ -83,8 +83,7 @@ def _marked(cell, source: str) -> str:
 
 
 def _plain(source) -> str:
-    """Cell source as Python: IPython's own lines (%magic, !shell, name?) become calls of its
-    shell."""
+    """Cell source as Python: IPython's own lines (%magic, !shell, name?) become calls to it."""
     text = source if isinstance(source, str) else "".join(source)
     text = re.sub(r"\A\s*%%.*\n", "", text)  # such as %%time, above a cell that is Python
     if _parse(text):
@@ -107,12 +106,10 @@ def _parse(source: str) -> ast.Module | None:
 
 
 def _is_stub(node) -> bool:
-    """Whether a function or class has nothing but the line that was handed out, in one of its
-    bodies."""
+    """Whether a body in a function or class has nothing but the line that was handed out."""
     bodies = [n.body for n in ast.walk(node) if isinstance(n, ast.FunctionDef)]
-    return any(
-        ast.unparse(body[-1]) == ast.unparse(ast.parse(STUB)) and _bare(body) for body in bodies
-    )
+    stub = ast.unparse(ast.parse(STUB))
+    return any(ast.unparse(body[-1]) == stub and _bare(body) for body in bodies)
 
 
 def _bare(body) -> bool:
@@ -135,8 +132,7 @@ def _defined(node) -> set[str]:
 
 
 def _busy(value) -> bool:
-    """Whether an expression calls anything but Python and the libraries; a lambda's body is not
-    called."""
+    """Whether an expression calls anything but Python and the libraries; a lambda calls nothing."""
     if isinstance(value, ast.Lambda):
         return False
     if isinstance(value, ast.Await):
@@ -152,8 +148,7 @@ def _busy(value) -> bool:
 
 @dataclass
 class Answer:
-    """The cell that answers an exercise, the definitions of other cells that it uses, and where it
-    stands."""
+    """The cell that answers an exercise, what it uses of other cells, and where it stands."""
 
     source: str
     helpers: list[str]
@@ -179,14 +174,12 @@ def answer(exercise: Exercise, books: list[Notebook]) -> Answer | None:
         return None
     book, i, cell = found[-1]
     rest = [b.name for b, _, c in found if b is not book and c.source != cell.source]
-    return Answer(
-        cell.source, _helpers(book.cells, i, exercise), book.name, rest[-1] if rest else ""
-    )
+    helpers = _helpers(book.cells, i, exercise)
+    return Answer(cell.source, helpers, book.name, rest[-1] if rest else "")
 
 
 def _helpers(cells: list[Cell], own: int, exercise: Exercise) -> list[str]:
-    """Imports, functions and constants of other cells that cell `own` uses, in the order of the
-    notebook.
+    """Imports, functions and constants of other cells that cell `own` uses, in notebook order.
 
     Of several definitions of a name the last above the cell counts, else the first below.
     """

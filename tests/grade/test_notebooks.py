@@ -1,5 +1,4 @@
-"""`pytest tests/grade -k 6.1`: the exercises as they stand in `notebooks/`. Those still open are
-skipped."""
+"""`pytest tests/grade -k 6.1`: the exercises as they stand in `notebooks/`, but for open ones."""
 
 import pytest
 

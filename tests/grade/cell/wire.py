@@ -77,8 +77,7 @@ def encode(value) -> bytes:
 
 
 def decode(data: bytes, tensor=None):
-    """The value of `encode`'s bytes. tensor: makes a tensor of an array; without it tensors stay
-    arrays.
+    """The value of `encode`'s bytes. tensor: makes a tensor of an array; else it stays an array.
 
     Raises Garbage.
     """
@@ -110,19 +109,15 @@ def decode(data: bytes, tensor=None):
             if "raised" in x:
                 return Raised(str(x["raised"])[:100], str(x["text"])[:1000])
             if "array" in x:
-                if x["array"] not in DTYPES or not all(
-                    type(k) is int and k >= 0 for k in x["shape"]
-                ):
+                sizes = all(type(k) is int and k >= 0 for k in x["shape"])
+                if x["array"] not in DTYPES or not sizes:
                     raise Garbage("no such array")
                 dtype = np.dtype(x["array"])
                 size = math.prod(x["shape"]) * dtype.itemsize
                 if len(x["shape"]) > 8 or place + size > len(data):
                     raise Garbage("an array longer than its bytes")
-                array = (
-                    np.frombuffer(data, dtype, math.prod(x["shape"]), place)
-                    .reshape(x["shape"])
-                    .copy()
-                )
+                flat = np.frombuffer(data, dtype, math.prod(x["shape"]), place)
+                array = flat.reshape(x["shape"]).copy()
                 place += size
                 if x["kind"] == "scalar" and array.ndim == 0:
                     return array[()]

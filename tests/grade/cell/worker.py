@@ -1,9 +1,8 @@
-"""The process where a student's code runs: it gets source and inputs, and returns values. It judges
-nothing.
+"""The process where a student's code runs: source and inputs come in, values go out.
 
-Started as `python -I worker.py FD READABLE...`, best inside bubblewrap. It imports the slow
-libraries once, and forks for every exercise; the fork confines itself before it runs a line of the
-student's.
+It judges nothing. Started as `python -I worker.py FD READABLE...`, best inside bubblewrap. It
+imports the slow libraries once, and forks for every exercise; the fork confines itself before it
+runs a line of the student's.
 """
 
 import ast
@@ -39,8 +38,10 @@ class Hidden:
 
 
 def confine(memory: int, cpu: int, readable: list[str]) -> None:
-    """Limit this process for good. memory: bytes beyond what it has now; cpu: seconds; readable:
-    paths."""
+    """Limit this process for good.
+
+    memory: bytes beyond what it has now. cpu: seconds. readable: paths.
+    """
     with open("/proc/self/statm") as f:
         size = int(f.read().split()[0]) * os.sysconf("SC_PAGE_SIZE")
     limits = {
@@ -74,22 +75,19 @@ def _prctl(option: int, *args) -> None:
 
 
 CREATE_RULESET, ADD_RULE, RESTRICT_SELF = 444, 445, 446
-# all that Landlock's first version knows: execute, write, read, list, make ...
-EVERY_ACCESS = (1 << 13) - 1
+EVERY_ACCESS = (1 << 13) - 1  # all that Landlock's first version knows: execute, write, read ...
 READ_FILE, READ_DIR = 1 << 2, 1 << 3
 
 
 def has_landlock() -> bool:
-    """Whether this kernel has Landlock, which keeps files from a process (Linux 5.13, where
-    switched on)."""
+    """Whether this kernel has Landlock (Linux 5.13, where switched on), which keeps files away."""
     with contextlib.suppress(OSError):
         return _call(CREATE_RULESET, None, ctypes.c_size_t(0), 1) >= 1
     return False
 
 
 def close_files(readable: list[str]) -> None:
-    """No file can be opened any more but those at or below the `readable` paths, to be read:
-    Landlock."""
+    """No file opens any more but those at or below the `readable` paths, to be read: Landlock."""
     handled = ctypes.c_uint64(EVERY_ACCESS)
     rules = _call(CREATE_RULESET, ctypes.byref(handled), ctypes.c_size_t(8), 0)
     for path in filter(os.path.exists, readable):
@@ -102,21 +100,22 @@ def close_files(readable: list[str]) -> None:
     os.close(rules)
 
 
-# A classic BPF program over struct seccomp_data: number at 0, architecture at 4, arguments at 16 +
-# 8 i.
+# A classic BPF program over struct seccomp_data: the call's number at 0, the architecture at 4,
+# argument i at 16 + 8 i.
 LOAD, EQUAL, ANY_BIT, RETURN = 0x20, 0x15, 0x45, 0x06
 ALLOW, ERRNO = 0x7FFF0000, 0x00050000
 EPERM, ENOSYS = 1, 38
 X86_64 = 0xC000003E
 DENIED = {
-    "fork": 57, "vfork": 58, "execve": 59, "execveat": 322, "socket": 41, "socketpair": 53, "connect": 42,
-    "bind": 49, "ptrace": 101, "process_vm_readv": 310, "process_vm_writev": 311, "setsid": 112,
-    "creat": 85, "truncate": 76, "rename": 82, "renameat": 264, "renameat2": 316, "unlink": 87,
-    "unlinkat": 263, "mkdir": 83, "mkdirat": 258, "rmdir": 84, "symlink": 88, "symlinkat": 266, "link": 86,
-    "linkat": 265, "chmod": 90, "fchmod": 91, "fchmodat": 268, "chown": 92, "mount": 165, "unshare": 272,
-    "setns": 308, "bpf": 321, "keyctl": 250, "memfd_create": 319, "io_uring_setup": 425,
-    "io_uring_enter": 426, "pidfd_open": 434, "pidfd_send_signal": 424, "openat2": 437, "fchmodat2": 452,
-    "setpriority": 141, "rt_sigqueueinfo": 129, "rt_tgsigqueueinfo": 297, "setrlimit": 160, "tkill": 200,
+    "fork": 57, "vfork": 58, "execve": 59, "execveat": 322, "socket": 41, "socketpair": 53,
+    "connect": 42, "bind": 49, "ptrace": 101, "process_vm_readv": 310, "process_vm_writev": 311,
+    "setsid": 112, "creat": 85, "truncate": 76, "rename": 82, "renameat": 264, "renameat2": 316,
+    "unlink": 87, "unlinkat": 263, "mkdir": 83, "mkdirat": 258, "rmdir": 84, "symlink": 88,
+    "symlinkat": 266, "link": 86, "linkat": 265, "chmod": 90, "fchmod": 91, "fchmodat": 268,
+    "chown": 92, "mount": 165, "unshare": 272, "setns": 308, "bpf": 321, "keyctl": 250,
+    "memfd_create": 319, "io_uring_setup": 425, "io_uring_enter": 426, "pidfd_open": 434,
+    "pidfd_send_signal": 424, "openat2": 437, "fchmodat2": 452, "setpriority": 141,
+    "rt_sigqueueinfo": 129, "rt_tgsigqueueinfo": 297, "setrlimit": 160, "tkill": 200,
 }  # fmt: skip
 KILL, TGKILL, PRLIMIT, CLONE, CLONE3, OPEN, OPENAT = 62, 234, 302, 56, 435, 2, 257
 CLONE_THREAD = 0x10000
@@ -124,14 +123,9 @@ WRITING = 0x1 | 0x2 | 0x40 | 0x200 | 0x400  # O_WRONLY, O_RDWR, O_CREAT, O_TRUNC
 
 
 def filter_calls() -> None:
-    """No new process, no signal to another, no socket, no file opened for writing: Linux
-    seccomp."""
-    program = [
-        (LOAD, 0, 0, 4),
-        (EQUAL, 1, 0, X86_64),
-        (RETURN, 0, 0, ERRNO | EPERM),
-        (LOAD, 0, 0, 0),
-    ]
+    """No new process, no signal to another, no socket, no file opened for writing: seccomp."""
+    program = [(LOAD, 0, 0, 4), (EQUAL, 1, 0, X86_64), (RETURN, 0, 0, ERRNO | EPERM)]
+    program += [(LOAD, 0, 0, 0)]
     # the x32 table of calls
     program += [(ANY_BIT, 0, 1, 0x40000000), (RETURN, 0, 0, ERRNO | ENOSYS)]
     for number in DENIED.values():
@@ -187,14 +181,8 @@ def define(job: dict) -> tuple[dict, Exception | None]:
     except Exception as e:
         failed = e
         space.pop(job["name"], None)
-        kinds = (
-            ast.FunctionDef
-            | ast.ClassDef
-            | ast.Import
-            | ast.ImportFrom
-            | ast.Assign
-            | ast.AnnAssign
-        )
+        kinds = ast.FunctionDef | ast.ClassDef | ast.Import | ast.ImportFrom
+        kinds |= ast.Assign | ast.AnnAssign
         for node in ast.parse(job["source"], "your cell").body:
             with contextlib.suppress(Exception):
                 if isinstance(node, kinds):
@@ -233,8 +221,7 @@ def run(job: dict, answer) -> None:
 
 
 class Answer:
-    """The way back to the judge; every message carries the number the judge gave to the
-    exercise."""
+    """The way back to the judge; every message carries the judge's number of the exercise."""
 
     def __init__(self, channel, number):
         self.channel, self.number = channel, number
@@ -248,8 +235,7 @@ class Answer:
 
 
 def main(fd: int, readable: list[str]) -> None:
-    """Serve exercises until the judge hangs up. readable: the paths that a student's code may
-    read."""
+    """Serve exercises until the judge hangs up. readable: paths that a student's code may read."""
     channel = socket.socket(fileno=fd)
     space = {}
     exec(PREAMBLE, space)

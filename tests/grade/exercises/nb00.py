@@ -57,7 +57,7 @@ to_pixels.check(
 )
 to_pixels.check("the corners", lambda rng: (np.array([[-1.0, -1.0], [1.0, 1.0]]), 84))
 to_pixels.mistake(
-    "y already runs down in keypoints, as rows do in a picture: it needs no turning round.",
+    "y already runs down in keypoints, as rows do in a picture: do not flip it.",
     "return (z + 1) / 2 * size",
     "z = z * (1, -1)\n    return (z + 1) / 2 * size",
 )
@@ -70,7 +70,8 @@ to_pixels.mistake(
     "From -1 to 1 it is 2 units, from edge to edge `size` pixels: halve.", "(z + 1) / 2", "(z + 1)"
 )
 to_pixels.mistake(
-    "-1 and 1 are the edges of the picture, `size` pixels apart, not the centres of its outer pixels.",
+    "-1 and 1 are the edges of the picture, `size` pixels apart, not the centres of its outer "
+    "pixels.",
     "/ 2 * size",
     "/ 2 * (size - 1)",
 )

@@ -70,13 +70,8 @@ def osc(J, M, h, e, v, kp):
 
 
 def _errors(rng):
-    return (
-        *_arm(rng),
-        rng.normal(size=7),
-        rng.normal(size=6),
-        rng.normal(size=6),
-        float(rng.uniform(50, 900)),
-    )
+    h, e, v = (rng.normal(size=n) for n in (7, 6, 6))
+    return *_arm(rng), h, e, v, float(rng.uniform(50, 900))
 
 
 osc.check("an arm on its way", _errors, points=2)
@@ -146,7 +141,8 @@ nullspace.mistake(
             obs, reward, terminated, truncated, infos = zip(*rows)
             episodes.append({
                 "start": start, "obs": np.stack(obs), "reward": np.array(reward, float),
-                "terminated": [bool(x) for x in terminated], "truncated": [bool(x) for x in truncated],
+                "terminated": [bool(x) for x in terminated],
+                "truncated": [bool(x) for x in truncated],
                 "success": [bool(i["is_success"]) for i in infos],
             })
         if ask == "kind":
@@ -168,13 +164,8 @@ class Point(gym.Env):
         self.x += 0.05 * float(np.clip(action[0], -1, 1))
         self.t += 1
         done = abs(self.x) < 0.05
-        return (
-            np.array([self.x], np.float32),
-            float(done),
-            False,
-            self.t >= 50,
-            {"is_success": done},
-        )
+        observation = np.array([self.x], np.float32)
+        return observation, float(done), False, self.t >= 50, {"is_success": done}
 
 
 def _walk(rng, most=1, steps=20, ask="episode"):
@@ -211,7 +202,7 @@ Point.mistake(
     "float(action[0])",
 )
 Point.mistake(
-    "The time limit is the clock's doing, not the task's end: it belongs into truncated.",
+    "The time limit is the clock's doing, not the task's end: it belongs in truncated.",
     "False, self.t >= 50",
     "self.t >= 50, False",
 )
@@ -246,7 +237,8 @@ Point.mistake(
     'self.np_random.uniform(-1, 1), getattr(self, "t", 0)',
 )
 Point.mistake(
-    "An observation is float32, as observation_space says: np.array([x], np.float32), also in step.",
+    "An observation is float32, as observation_space says: np.array([x], np.float32), also in "
+    "step.",
     "np.array([self.x], np.float32)",
     "np.array([self.x])",
 )

@@ -1,4 +1,4 @@
-"""Notebook 2, soft actor-critic: tanh-Gaussian, critics' target and slow copies, temperature, actor."""
+"""Notebook 2, soft actor-critic: squashed Gaussian, critics' target, slow copies, temperature."""
 
 import math
 
@@ -63,11 +63,9 @@ def _adds_up_to_one(got, args):
         return "it should return floating-point numbers"
     density = np.exp(np.minimum(log_pi.astype(float), 50))
     area = float((np.diff(a[:, 0]) * (density[1:] + density[:-1]) / 2).sum())
-    return (
-        None
-        if abs(area - 1) < 0.01
-        else f"the density over all actions adds up to {area:.3f}; expected 1"
-    )
+    if abs(area - 1) < 0.01:
+        return None
+    return f"the density over all actions adds up to {area:.3f}; expected 1"
 
 
 def _far_out(rng):
@@ -90,13 +88,14 @@ squash.mistake(
     "u = (mean + log_std.exp() * noise).detach()",
 )
 squash.mistake(
-    "The values are right, but the gradient does not pass through the tanh's correction: no detach there.",
+    "The values are right, but the gradient does not pass through the tanh's correction: no detach "
+    "there.",
     "log_slope = 2 * (math.log(2) - u - F.softplus(-2 * u))",
     "log_slope = (2 * (math.log(2) - u - F.softplus(-2 * u))).detach()",
 )
 squash.mistake(
-    "The values are right, but no gradient leaves your function: no torch.no_grad, no numpy, no detach at "
-    "the end.",
+    "The values are right, but no gradient leaves your function: no torch.no_grad, no numpy, no "
+    "detach at the end.",
     "torch.tanh(u), (log_normal - log_slope).sum(-1)",
     "torch.tanh(u).detach(), (log_normal - log_slope).sum(-1).detach()",
 )
@@ -106,13 +105,14 @@ squash.mistake(
     "log_std * noise",
 )
 squash.mistake(
-    "This is the density of u, before the tanh. The tanh squeezes the axis: which term says by how much?",
+    "This is the density of u, before the tanh. The tanh squeezes the axis: which term says by how "
+    "much?",
     "(log_normal - log_slope)",
     "log_normal",
 )
 squash.mistake(
-    "Your correction has the wrong sign: where the tanh is flat, many u share a short stretch of a, and the "
-    "density of a is higher there than that of u.",
+    "Your correction has the wrong sign: where the tanh is flat, many u share a short stretch of "
+    "a, and the density of a is higher there than that of u.",
     "log_normal - log_slope",
     "log_normal + log_slope",
 )
@@ -123,23 +123,26 @@ squash.mistake(
     "torch.log(1 - torch.tanh(u) ** 2)",
 )
 squash.mistake(
-    "A small constant inside the log keeps it finite, but wrong far out, where the slope is smaller than "
-    "that constant. The form with softplus needs none.",
+    "A small constant inside the log keeps it finite, but wrong far out, where the slope is "
+    "smaller than that constant. The form with softplus needs none.",
     "2 * (math.log(2) - u - F.softplus(-2 * u))",
     "torch.log(1 - torch.tanh(u) ** 2 + 1e-6)",
 )
 squash.mistake(
-    "A wider Gaussian is a lower one: your log-density of u does not depend on the standard deviation.",
+    "A wider Gaussian is a lower one: your log-density of u does not depend on the standard "
+    "deviation.",
     "-log_std - 0.5",
     "-0.5",
 )
 squash.mistake(
-    "The numbers of an action are independent: densities multiply, so logs add up. You average them.",
+    "The numbers of an action are independent: densities multiply, so logs add up. You average "
+    "them.",
     ".sum(-1)",
     ".mean(-1)",
 )
 squash.mistake(
-    "One log-density an action, shape (B,), not one for each of its numbers: add up over the last dimension.",
+    "One log-density an action, shape (B,), not one for each of its numbers: add up over the last "
+    "dimension.",
     ".sum(-1)",
     "",
 )
@@ -171,7 +174,8 @@ critic_target.mistake(
     "torch.maximum",
 )
 critic_target.mistake(
-    "You average the two critics: an error upwards of one still gets in. Take the smaller, number by number.",
+    "You average the two critics: an error upwards of one still gets in. Take the smaller, number "
+    "by number.",
     "torch.minimum(q1, q2)",
     "0.5 * (q1 + q2)",
 )
@@ -191,7 +195,8 @@ critic_target.mistake(
     "+ alpha * log_pi",
 )
 critic_target.mistake(
-    "You cut the future off at the time limit: the clock stopped the episode, but the state goes on.",
+    "You cut the future off at the time limit: the clock stopped the episode, but the state goes "
+    "on.",
     "(1 - terminal)",
     "(1 - terminal) * (1 - truncated)",
 )
@@ -201,8 +206,10 @@ critic_target.mistake(
     "1",
 )
 critic_target.mistake(
-    "The next action's entropy lies in the future too: it belongs inside what is discounted and cut off.",
-    "value = torch.minimum(q1, q2) - alpha * log_pi\n    return reward + gamma * (1 - terminal) * value",
+    "The next action's entropy lies in the future too: it belongs inside what is discounted and "
+    "cut off.",
+    "value = torch.minimum(q1, q2) - alpha * log_pi\n    return reward + gamma * (1 - terminal) * "
+    "value",
     "return reward - alpha * log_pi + gamma * (1 - terminal) * torch.minimum(q1, q2)",
 )
 
@@ -252,7 +259,8 @@ follow.mistake(
     "fast",
 )
 follow.mistake(
-    "You add a share of the online weights but keep all of the old ones: the two shares have to sum to 1.",
+    "You add a share of the online weights but keep all of the old ones: the two shares have to "
+    "sum to 1.",
     "(1 - tau) * slow + tau * fast",
     "slow + tau * fast",
 )
@@ -327,8 +335,8 @@ temperature_loss.mistake(
     "(alpha",
 )
 temperature_loss.mistake(
-    "The entropy is -E[log pi], so it has reached its target where log_pi + target_entropy is 0 on average; "
-    "yours is 0 elsewhere.",
+    "The entropy is -E[log pi], so it has reached its target where log_pi + target_entropy is 0 on "
+    "average; yours is 0 elsewhere.",
     "log_pi.detach() + target_entropy",
     "log_pi.detach() - target_entropy",
 )
@@ -338,7 +346,8 @@ temperature_loss.mistake(
     "log_alpha",
 )
 temperature_loss.mistake(
-    "The value is right, but the gradient also runs into log_pi and changes the policy: stop it there.",
+    "The value is right, but the gradient also runs into log_pi and changes the policy: stop it "
+    "there.",
     "log_pi.detach()",
     "log_pi",
 )
@@ -392,12 +401,14 @@ actor_loss.check("the value of the loss", lambda rng: _policy(rng, "loss"))
 actor_loss.check("the gradient that reaches the actor", lambda rng: _policy(rng, "actor"), points=2)
 actor_loss.check("no gradient reaches the temperature", lambda rng: _policy(rng, "alpha"))
 actor_loss.mistake(
-    "Your loss falls when the critics' values fall: the actor learns to do its worst. Mind Q's sign.",
+    "Your loss falls when the critics' values fall: the actor learns to do its worst. Mind Q's "
+    "sign.",
     "* log_pi - q",
     "* log_pi + q",
 )
 actor_loss.mistake(
-    "You take the larger of the two critics' values: the actor would seek out where one errs upwards.",
+    "You take the larger of the two critics' values: the actor would seek out where one errs "
+    "upwards.",
     "amin(0)",
     "amax(0)",
 )
@@ -415,7 +426,8 @@ actor_loss.mistake(
     "amin()",
 )
 actor_loss.mistake(
-    "The loss's value is right, but the entropy's gradient does not reach the actor: log_pi keeps its graph.",
+    "The loss's value is right, but the entropy's gradient does not reach the actor: log_pi keeps "
+    "its graph.",
     "* log_pi - q",
     "* log_pi.detach() - q",
 )
@@ -431,12 +443,13 @@ actor_loss.mistake(
     "critics(s, a.detach())",
 )
 actor_loss.mistake(
-    "The loss's value is right, but its gradient also changes the temperature, which has a loss of its own.",
+    "The loss's value is right, but its gradient also changes the temperature, which has a loss of "
+    "its own.",
     "log_alpha.exp().detach()",
     "log_alpha.exp()",
 )
 actor_loss.mistake(
-    "Entropy is weighed by alpha; you weigh it by its logarithm.",
+    "Entropy is weighted by alpha; you weight it by its logarithm.",
     "log_alpha.exp().detach()",
     "log_alpha.detach()",
 )

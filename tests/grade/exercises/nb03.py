@@ -51,17 +51,16 @@ minimum_jerk.mistake(
     probe="""
     import pybullet as p
 
-    import pybullet as p
-
     def _body(body, client):
         low, high = p.getAABB(body, -1, client)
         place, _ = p.getBasePositionAndOrientation(body, client)
         mass, friction = p.getDynamicsInfo(body, -1, client)[:2]
-        return {"mass": mass, "friction": friction, "place": np.array(place), "size": np.subtract(high, low)}
+        size = np.subtract(high, low)
+        return {"mass": mass, "friction": friction, "place": np.array(place), "size": size}
 
     def _world(client):
-        n = p.getNumBodies(client)
-        frictions = [p.getDynamicsInfo(p.getBodyUniqueId(i, client), -1, client)[1] for i in range(n)]
+        bodies = [p.getBodyUniqueId(i, client) for i in range(p.getNumBodies(client))]
+        frictions = [p.getDynamicsInfo(body, -1, client)[1] for body in bodies]
         shape = p.createCollisionShape(p.GEOM_SPHERE, radius=1, physicsClientId=client)
         return shape, frictions
 
@@ -78,9 +77,13 @@ minimum_jerk.mistake(
                 table, cube = make_push(client)
             finally:
                 if _world(other) != (shape + 1, frictions):
-                    raise ValueError("a call went to another world: physicsClientId=client in every one")
+                    raise ValueError(
+                        "a call went to another world: physicsClientId=client in every one"
+                    )
             if p.getNumBodies(client) < 2:
-                raise ValueError("two bodies are not in this world: physicsClientId=client in every call")
+                raise ValueError(
+                    "two bodies are not in this world: physicsClientId=client in every call"
+                )
             if ask == "bodies":
                 return {"table": _body(table, client), "cube": _body(cube, client)}
             if ask == "flight":  # nothing in the way, no weight
@@ -91,7 +94,10 @@ minimum_jerk.mistake(
                 p.stepSimulation(client)
             if ask == "flight":
                 v, w = p.getBaseVelocity(cube, client)
-                return {"share of its speed after 2 s": v[0] / speed, "share of its turning": w[2] / speed}
+                return {
+                    "share of its speed after 2 s": v[0] / speed,
+                    "share of its turning": w[2] / speed,
+                }
             end = p.getBasePositionAndOrientation(cube, client)[0]
             return {"slid to x": end[0], "height": end[2]}
         finally:
@@ -125,7 +131,7 @@ make_push.check(
     "flying free it keeps its speed and its turning", lambda rng: _speed(rng, "flight"), atol=2e-3
 )
 make_push.mistake(
-    "Bullet multiplies both bodies' friction, and a table has 0.5 at birth: set the table's, too.",
+    "Bullet multiplies both bodies' friction, and a new table has 0.5: set the table's, too.",
     "p.changeDynamics(table, -1, lateralFriction=1.0, physicsClientId=client)",
     "pass",
 )
@@ -158,7 +164,8 @@ make_push.mistake(
     "(0.53, 0, 0)",
 )
 make_push.mistake(
-    "The table has friction 1.0 and the cube 0.6: yours are swapped. The product hides it from a slide.",
+    "The table has friction 1.0 and the cube 0.6: yours are swapped. The product hides it from a "
+    "slide.",
     "table, -1, lateralFriction=1.0",
     "table, -1, lateralFriction=0.6",
     "cube, -1, lateralFriction=0.6",
@@ -180,7 +187,7 @@ make_push.mistake(
     "",
 )
 make_push.mistake(
-    "A body of mass 0 stands fast for ever: the cube weighs 0.4 kg.",
+    "A body of mass 0 never moves: the cube weighs 0.4 kg.",
     "createMultiBody(0.4",
     "createMultiBody(0",
 )
@@ -196,7 +203,7 @@ def moving_share(x, take, least):
 
 
 def _takes(rng, take=25, n=8):
-    """Cubes that are pushed for a while, forth or back; some by just `least` a frame. Sums are exact."""
+    """Cubes pushed for a while, forth or back; some by just `least` a frame. Sums are exact."""
     least = 2.0**-11
     x = np.repeat(rng.integers(1024, 1434, n), take).reshape(n, take) * least
     for row in x:
@@ -213,7 +220,8 @@ moving_share.check(
     lambda rng: (np.repeat(rng.uniform(0.5, 0.7, 6), 10), 10, 0.0005),
 )
 moving_share.mistake(
-    "Between two takes the cube is put elsewhere, and nobody pushed it: compare only within a take.",
+    "Between two takes the cube is put elsewhere, and nobody pushed it: compare only within a "
+    "take.",
     "np.diff(x.reshape(-1, take), axis=1)",
     "np.diff(x)",
 )
@@ -229,7 +237,8 @@ moving_share.mistake(
     "moved.sum() / len(x)",
 )
 moving_share.mistake(
-    "A video has T - 1 transitions, but those from take to take do not count: divide by the others.",
+    "A video has T - 1 transitions, but those from take to take do not count: divide by the "
+    "others.",
     "moved.mean()",
     "moved.sum() / (len(x) - 1)",
 )

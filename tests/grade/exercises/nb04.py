@@ -36,7 +36,8 @@ adain.check(
     rtol=1e-3,
 )
 adain.mistake(
-    "You normalise over the whole batch: each image has a style of its own, so average over H and W only.",
+    "You normalise over the whole batch: each image has a style of its own, so average over H and "
+    "W only.",
     "(2, 3)",
     "(0, 2, 3)",
 )
@@ -53,7 +54,8 @@ adain.mistake(
 )
 adain.mistake("First take out the features' own mean.", "(h - mu)", "h")
 adain.mistake(
-    "Your variance is divided by n - 1, as torch does by default; `unbiased=False` divides by H * W.",
+    "Your variance is divided by n - 1, as torch does by default; `unbiased=False` divides by H * "
+    "W.",
     "unbiased=False, ",
     "",
 )
@@ -130,7 +132,8 @@ gan_losses.mistake(
         content = {"x": lambda v: 0.5 * v + 0.1, "y": lambda v: 0.7 * v - 0.2}
         style = {"x": lambda v: v.mean((2, 3)) + 0.3, "y": lambda v: 2 * v.mean((2, 3)) - 0.4}
         decode = {
-            "x": lambda c, s: c + 1.5 * s[:, :, None, None], "y": lambda c, s: 0.8 * c - s[:, :, None, None],
+            "x": lambda c, s: c + 1.5 * s[:, :, None, None],
+            "y": lambda c, s: 0.8 * c - s[:, :, None, None],
         }
         return tuple(float(v) for v in reconstructions(x, y, content, style, decode))
     """,
@@ -153,7 +156,8 @@ reconstructions.check(
     "images of another size", lambda rng: (_tensor(rng, 1, 3, 9, 5), _tensor(rng, 1, 3, 9, 5) + 1)
 )
 reconstructions.mistake(
-    "Eq. 3 decodes with the other domain's generator: c_x goes into G_Y with s_y, and comes back by E_Y.",
+    "Eq. 3 decodes with the other domain's generator: c_x goes into G_Y with s_y, and comes back "
+    "by E_Y.",
     'content["y"](decode["y"](c_x, s_y))',
     'content["x"](decode["x"](c_x, s_x))',
 )
@@ -168,7 +172,8 @@ reconstructions.mistake(
     'style["x"](decode["x"](c_x, s_x))',
 )
 reconstructions.mistake(
-    "Yours is the style loss of y. Eq. 4 swaps the other way than Eq. 3, G_X(c_y, s_x), and reads back s_x.",
+    "Yours is the style loss of y. Eq. 4 swaps the other way than Eq. 3, G_X(c_y, s_x), and reads "
+    "back s_x.",
     'style["x"](decode["x"](c_y, s_x)) - s_x',
     'style["y"](decode["y"](c_x, s_y)) - s_y',
 )

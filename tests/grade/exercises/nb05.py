@@ -51,7 +51,8 @@ soft_argmax.mistake(
     "logits.softmax(-1) / logits.shape[2]",
 )
 soft_argmax.mistake(
-    "Your softmax goes over each row by itself, so that a map sums to h, not to 1: flatten its cells first.",
+    "Your softmax goes over each row by itself, so that a map sums to h, not to 1: flatten its "
+    "cells first.",
     "logits.flatten(2).softmax(-1).view(logits.shape)",
     "logits.softmax(-1)",
 )
@@ -119,12 +120,14 @@ heat_map.mistake(
     "/ sigma) ** 2 / 2",
 )
 heat_map.mistake(
-    "Your cells run from edge to edge: cell 0's centre is half a cell inside, at 1 / size - 1, as in 5.1.",
+    "Your cells run from edge to edge: cell 0's centre is half a cell inside, at 1 / size - 1, as "
+    "in 5.1.",
     "(2 * torch.arange(size) + 1) / size - 1",
     "torch.linspace(-1, 1, size)",
 )
 heat_map.mistake(
-    "The square of the distance stands in the exponent, (d / sigma)^2; yours has the distance itself.",
+    "The square of the distance stands in the exponent, (d / sigma)^2; yours has the distance "
+    "itself.",
     "torch.exp(-(((cells - z[..., 0, None]) / sigma) ** 2))",
     "((cells - z[..., 0, None]) / sigma) ** 2",
     "torch.exp(-(((cells - z[..., 1, None]) / sigma) ** 2))",
@@ -138,12 +141,14 @@ heat_map.mistake(
     "h.sum(1, keepdim=True).clamp(max=1)",
 )
 heat_map.mistake(
-    "The largest h_k is not it: two keypoints cover more than one. Take 1 minus the product of (1 - h_k).",
+    "The largest h_k is not it: two keypoints cover more than one. Take 1 minus the product of (1 "
+    "- h_k).",
     "1 - (1 - h).prod(1, keepdim=True)",
     "h.amax(1, keepdim=True)",
 )
 heat_map.mistake(
-    "Keep a dimension of size 1 for the channels, so that H multiplies features of any number of them.",
+    "Keep a dimension of size 1 for the channels, so that H multiplies features of any number of "
+    "them.",
     "prod(1, keepdim=True)",
     "prod(1)",
 )
@@ -189,7 +194,8 @@ transport.mistake(
     "(1 - h_y) * phi_y + h_x * phi_x",
 )
 transport.mistake(
-    "A cell is cut out if either frame has a keypoint there: (1 - H_x)(1 - H_y), which is not 1 - H_x H_y.",
+    "A cell is cut out if either frame has a keypoint there: (1 - H_x)(1 - H_y), which is not 1 - "
+    "H_x H_y.",
     "(1 - h_x) * (1 - h_y)",
     "(1 - h_x * h_y)",
 )
@@ -214,17 +220,20 @@ loss.check(
     lambda rng: ((y := _images(rng))[0], y[2].expand(2, 3, 8, 8).clone(), y[2]),
 )
 loss.mistake(
-    "The weight is one number a pixel: the mean over the three colours, with the channel's dimension kept.",
+    "The weight is one number a pixel: the mean over the three colours, with the channel's "
+    "dimension kept.",
     ".mean(1, keepdim=True)",
     "",
 )
 loss.mistake(
-    "Take |y - median| first, then its mean over the colours: yours lets colours that go up and down cancel.",
+    "Take |y - median| first, then its mean over the colours: yours lets colours that go up and "
+    "down cancel.",
     ".abs().mean(1, keepdim=True)",
     ".mean(1, keepdim=True).abs()",
 )
 loss.mistake(
-    "Do not divide by the mean weight: take the plain mean of weight times square over all entries.",
+    "Do not divide by the mean weight: take the plain mean of weight times square over all "
+    "entries.",
     "(weight * (y_hat - y) ** 2).mean()",
     "(weight * (y_hat - y) ** 2).mean() / weight.mean()",
 )
@@ -277,8 +286,8 @@ r2.check(
     atol=1e-3,
 )
 r2.mistake(
-    "You judge on the frames you fitted: keypoints that know nothing still fit a little. Fit on the first "
-    "half, judge on the second.",
+    "You judge on the frames you fitted: keypoints that know nothing still fit a little. Fit on "
+    "the first half, judge on the second.",
     "held = truth[half:]",
     "held, half = truth, 0",
 )
@@ -288,7 +297,8 @@ r2.mistake(
     "A, truth",
 )
 r2.mistake(
-    "You fit on the even frames and judge on the odd ones, their neighbours: fit on the first half.",
+    "You fit on the even frames and judge on the odd ones, their neighbours: fit on the first "
+    "half.",
     "A[:half], truth[:half]",
     "A[::2], truth[::2]",
     "truth[half:]",
@@ -297,17 +307,19 @@ r2.mistake(
     "A[1::2]",
 )
 r2.mistake(
-    "The mean below the line is that of the second half, on which you judge; yours is that of the first.",
+    "The mean in the denominator is that of the second half, on which you judge; yours is that of "
+    "the first.",
     "held.mean()",
     "truth[:half].mean()",
 )
 r2.mistake(
-    "The mean below the line is that of the second half alone; yours is that of all frames.",
+    "The mean in the denominator is that of the second half alone; yours is that of all frames.",
     "held.mean()",
     "truth.mean()",
 )
 r2.mistake(
-    "A squared correlation forgives a wrong scale and place: take 1 minus squared errors over spread.",
+    "A squared correlation forgives a wrong scale and place: take 1 minus squared errors over "
+    "spread.",
     "1 - ((A[half:] @ W - held) ** 2).sum() / ((held - held.mean()) ** 2).sum()",
     "np.corrcoef(A[half:] @ W, held)[0, 1] ** 2",
 )

@@ -56,7 +56,8 @@ r1.mistake(
     "np.sqrt(((z_E[:-1] - z) ** 2).sum(axis=2))",
 )
 r1.mistake(
-    "You add up one distance per keypoint: the norm goes over all K keypoints and both coordinates at once.",
+    "You add up one distance per keypoint: the norm goes over all K keypoints and both coordinates "
+    "at once.",
     "np.sqrt(((z_E[:-1] - z) ** 2).sum(axis=(1, 2)))",
     "np.sqrt(((z_E[:-1] - z) ** 2).sum(axis=2)).sum(axis=1)",
 )
@@ -101,8 +102,8 @@ r2.mistake(
     "z_E[1:-1] - z_E[:-2]",
 )
 r2.mistake(
-    "q is not p: Eq. 10 takes the step most like the robot's, wherever it was made; you take the step at the "
-    "nearest frame.",
+    "q is not p: Eq. 10 takes the step most like the robot's, wherever it was made; you take the "
+    "step at the nearest frame.",
     "z_E[1:] - z_E[:-1]",
     "(z_E[1:] - z_E[:-1])[[((z_E[:-1] - z) ** 2).sum(axis=(1, 2)).argmin()]]",
 )
@@ -148,7 +149,8 @@ episode_return.mistake(
     "lambda_r1 weighs r1, lambda_r2 weighs r2; yours are swapped.", "lam1, lam2):", "lam2, lam1):"
 )
 episode_return.mistake(
-    "T frames have T - 1 transitions, and each earns one r_1; yours adds a T-th, that of the last frame.",
+    "T frames have T - 1 transitions, and each earns one r_1; yours adds a T-th, that of the last "
+    "frame.",
     "return total",
     "return total + lam1 * r1(z[-1], z_E)",
 )
@@ -201,14 +203,15 @@ trim.check(
 )
 trim.check("first and last frame stay", lambda rng: (_rest(rng), 0.1))
 trim.mistake(
-    "Compare with the last frame you kept, not with the one before: slow motion would vanish as a whole.",
+    "Compare with the last frame you kept, not with the one before: slow motion would vanish as a "
+    "whole.",
     "z[kept[-1]]",
     "z[i - 1]",
 )
 trim.mistake("The last frame is the goal: keep it always.", "kept + [len(z) - 1]", "kept")
 trim.mistake("You keep what rests and cut what moves.", ">= least", "< least")
 trim.mistake(
-    "Your last frame stands there twice: the rule has kept it already, and you add it once more.",
+    "Your last frame is there twice: the rule has kept it already, and you add it once more.",
     "range(1, len(z) - 1)",
     "range(1, len(z))",
 )
@@ -265,7 +268,8 @@ timed_r1.mistake(
     "min(t + 1, len(z_E) - 2)",
 )
 timed_r1.mistake(
-    "You add up one distance per keypoint: the distance is the length of all 2K numbers, as in Eq. 9.",
+    "You add up one distance per keypoint: the distance is the length of all 2K numbers, as in Eq. "
+    "9.",
     "np.linalg.norm(z_next - target)",
     "np.linalg.norm(z_next - target, axis=1).sum()",
 )

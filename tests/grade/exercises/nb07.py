@@ -16,12 +16,13 @@ stopping.check(
     "other friction", lambda rng: (float(rng.uniform(0.3, 3)), float(rng.uniform(0.05, 0.8)))
 )
 stopping.mistake(
-    "Your distance is that of a puck that keeps its speed: the mean speed of a puck that stops is v / 2.",
+    "Your distance is that of a puck that keeps its speed: the mean speed of a puck that stops is "
+    "v / 2.",
     "v**2 / (2 * mu * g)",
     "v**2 / (mu * g)",
 )
 stopping.mistake(
-    "Python divides and multiplies from left to right: bracket what stands below the line.",
+    "Python divides and multiplies from left to right: put the denominator in brackets.",
     "v**2 / (2 * mu * g), v / (mu * g)",
     "v**2 / 2 * mu * g, v / mu * g",
 )
@@ -55,12 +56,14 @@ speeds.check(
     lambda rng: (0.03, 0.05, float(rng.uniform(0.05, 0.5))),
 )
 speeds.mistake(
-    "You take the slack as a slack of speed: find the nearest and the farthest place, then their speeds.",
+    "You take the slack as a slack of speed: find the nearest and the farthest place, then their "
+    "speeds.",
     "np.sqrt(2 * mu * g * max(low, 0)), np.sqrt(2 * mu * g * high)",
     "np.sqrt(2 * mu * g * distance) - slack, np.sqrt(2 * mu * g * distance) + slack",
 )
 speeds.mistake(
-    "Where the slack is larger than the way, the lowest speed is 0: a root of a negative number is NaN.",
+    "Where the slack is larger than the way, the lowest speed is 0: a root of a negative number is "
+    "NaN.",
     "max(low, 0)",
     "low",
 )
@@ -116,7 +119,8 @@ friction.mistake(
     "np.polyfit returns the highest power first: that of t^2 is [0].", "t, x, 2)[0]", "t, x, 2)[2]"
 )
 friction.mistake(
-    "T frames have T - 1 steps of dt between them: the last is at (T - 1) * dt. np.arange counts right.",
+    "T frames have T - 1 steps of dt between them: the last is at (T - 1) * dt. np.arange counts "
+    "right.",
     "dt * np.arange(len(x))",
     "np.linspace(0, len(x) * dt, len(x))",
 )
@@ -174,7 +178,8 @@ solved.check(
 )
 solved.mistake("A step is dt seconds: divide the way by it to get a speed in m/s.", " / dt", "")
 solved.mistake(
-    "A puck that slides across the target is not there: ask for less than 2 cm/s at the same moment.",
+    "A puck that slides across the target is not there: ask for less than 2 cm/s at the same "
+    "moment.",
     "& (speed < 0.02)",
     "",
 )

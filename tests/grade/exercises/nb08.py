@@ -52,7 +52,8 @@ foreground.mistake(
     "",
 )
 foreground.mistake(
-    "Differences of opposite sign must not cancel: the absolute value first, then the mean over the colours.",
+    "Differences of opposite sign must not cancel: the absolute value first, then the mean over "
+    "the colours.",
     "np.abs(video - np.median(video, axis=0)).mean(-1)",
     "np.abs((video - np.median(video, axis=0)).mean(-1))",
 )
@@ -62,7 +63,8 @@ foreground.mistake(
     ".max(-1) > threshold",
 )
 foreground.mistake(
-    "The median is a picture, one value for each pixel and colour: give np.median the axis of time, 0.",
+    "The median is a picture, one value for each pixel and colour: give np.median the axis of "
+    "time, 0.",
     "np.median(video, axis=0)",
     "np.median(video)",
 )
@@ -166,7 +168,8 @@ disturbance.mistake(
     "From -1 to 1 are 2 units over `size` pixels: half of size for each.", "* size / 2", "* size"
 )
 disturbance.mistake(
-    "-1 and 1 are the edges of the picture, `size` pixels apart, not the centres of its outer pixels.",
+    "-1 and 1 are the edges of the picture, `size` pixels apart, not the centres of its outer "
+    "pixels.",
     "* size / 2",
     "* (size - 1) / 2",
 )

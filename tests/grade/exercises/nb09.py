@@ -29,8 +29,8 @@ from tests.grade.exercise import exercise
                 if step < 250 * seconds:
                     p.applyExternalForce(body, 0, (force, 0, 0), (0, 0, 0), p.LINK_FRAME, client)
                 p.stepSimulation(client)
-            size = [b - a for a, b in zip(low, high)]
-            return {"joint": np.array(q), "mass": mass, "size": np.array(size), "shapes of the base": parts}
+            size = np.subtract(high, low)
+            return {"joint": np.array(q), "mass": mass, "size": size, "shapes of the base": parts}
         finally:
             p.disconnect(client)
             p.disconnect(other)
@@ -41,9 +41,10 @@ def make_drawer(client, friction):
         p.GEOM_BOX, halfExtents=(0.05, 0.08, 0.04), physicsClientId=client
     )
     body = p.createMultiBody(
-        baseMass=0, linkMasses=[0.8], linkCollisionShapeIndices=[shape], linkVisualShapeIndices=[-1],
-        linkPositions=[(0, 0, 0)], linkOrientations=[(0, 0, 0, 1)], linkInertialFramePositions=[(0, 0, 0)],
-        linkInertialFrameOrientations=[(0, 0, 0, 1)], linkParentIndices=[0],
+        baseMass=0, linkMasses=[0.8], linkParentIndices=[0],
+        linkCollisionShapeIndices=[shape], linkVisualShapeIndices=[-1],
+        linkPositions=[(0, 0, 0)], linkOrientations=[(0, 0, 0, 1)],
+        linkInertialFramePositions=[(0, 0, 0)], linkInertialFrameOrientations=[(0, 0, 0, 1)],
         linkJointTypes=[p.JOINT_PRISMATIC], linkJointAxis=[(1, 0, 0)], physicsClientId=client,
     )  # fmt: skip
     p.changeDynamics(
@@ -75,14 +76,15 @@ make_drawer.check(
 )
 make_drawer.check("it stops where it is shut", lambda rng: _push(rng, 15, 25, 1.0), atol=5e-3)
 make_drawer.mistake(
-    "It gives way to any push: dry friction is a velocity motor that wants 0 and has at most that force.",
+    "It gives way to any push: dry friction is a velocity motor that wants 0 and has at most that "
+    "force.",
     "force=friction",
     "force=0",
 )
 make_drawer.mistake("The friction is the argument, not always 18 N.", "force=friction", "force=18")
 make_drawer.mistake(
-    "It does not give way along x: is the joint's axis (1, 0, 0), and Bullet's own motor replaced by yours "
-    "(setJointMotorControl2)?",
+    "It does not give way along x: is the joint's axis (1, 0, 0), and Bullet's own motor replaced "
+    "by yours (setJointMotorControl2)?",
     "linkJointAxis=[(1, 0, 0)]",
     "linkJointAxis=[(0, 1, 0)]",
 )
@@ -90,7 +92,8 @@ make_drawer.mistake(
     "It turns instead of sliding: the joint is prismatic.", "p.JOINT_PRISMATIC", "p.JOINT_REVOLUTE"
 )
 make_drawer.mistake(
-    "A motor that wants a position pulls the drawer back: friction wants velocity 0, VELOCITY_CONTROL.",
+    "A motor that wants a position pulls the drawer back: friction wants velocity 0, "
+    "VELOCITY_CONTROL.",
     "p.VELOCITY_CONTROL, targetVelocity=0",
     "p.POSITION_CONTROL, targetPosition=-0.15",
 )
@@ -100,15 +103,16 @@ make_drawer.mistake(
     "resetJointState(body, 0, 0.0",
 )
 make_drawer.mistake(
-    "It slides on through the cabinet: set the joint's limits to -0.15 and 0, with jointDamping=0 in the "
-    "same call of changeDynamics (without it PyBullet forgets the limits).",
+    "It slides on through the cabinet: set the joint's limits to -0.15 and 0, with jointDamping=0 "
+    "in the same call of changeDynamics (without it PyBullet forgets the limits).",
     "jointLowerLimit=-0.15",
     "jointLowerLimit=-9",
     "jointUpperLimit=0",
     "jointUpperLimit=9",
 )
 make_drawer.mistake(
-    "Something else brakes it: Bullet damps links and joints by default; linearDamping=0 and jointDamping=0.",
+    "Something else brakes it: Bullet damps links and joints by default; linearDamping=0 and "
+    "jointDamping=0.",
     "        linearDamping=0,\n        jointDamping=0,\n",
     "",
 )
@@ -123,7 +127,8 @@ make_drawer.mistake(
     "baseMass=0, baseCollisionShapeIndex=shape, ",
 )
 make_drawer.mistake(
-    "Your calls go to another world than the one you were given: physicsClientId=client in every one.",
+    "Your calls go to another world than the one you were given: physicsClientId=client in every "
+    "one.",
     "physicsClientId=client",
     "physicsClientId=client - 1",
 )
@@ -163,7 +168,8 @@ observe.mistake(
     "(z - target)",
 )
 observe.mistake(
-    "Give the way to the demonstration, not its place: or the policy has to learn the video by heart.",
+    "Give the way to the demonstration, not its place: or the policy has to learn the video by "
+    "heart.",
     "(target - z)",
     "target",
 )
@@ -173,7 +179,8 @@ observe.mistake(
     "[[clock], z.ravel(), *steps, (target - z).ravel()]",
 )
 observe.mistake(
-    "Flatten each array whole, x and y of keypoint 1 first; yours mixes the arrays keypoint by keypoint.",
+    "Flatten each array whole, x and y of keypoint 1 first; yours mixes the arrays keypoint by "
+    "keypoint.",
     "return np.concatenate([z.ravel(), *steps, (target - z).ravel(), [clock]])",
     "return np.append(np.stack([z, z - z_1, z_1 - z_2, target - z], 1).ravel(), clock)",
 )
@@ -206,7 +213,8 @@ observe.mistake(
             return {"policy for": reward}
 
         policy = learn_by_watching(demo, robot, translate, detect, make_reward, train)
-        return {"policy": policy, "translations": calls.count("translate"), "trainings": calls.count("train")}
+        counts = {"translations": calls.count("translate"), "trainings": calls.count("train")}
+        return {"policy": policy} | counts
     """,
 )
 def learn_by_watching(demo, robot, translate, detect, make_reward, train):

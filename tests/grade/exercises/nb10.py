@@ -37,7 +37,7 @@ wilson.mistake(
 )
 wilson.mistake("Both centre and half width are divided by 1 + z^2 / n.", " / (1 + z**2 / n)", "")
 wilson.mistake(
-    "Under the root and in the centre, n stands below the line: z**2 / (2 * n), with brackets.",
+    "Under the root and in the centre, n is in the denominator: z**2 / (2 * n), with brackets.",
     "z**2 / (2 * n)",
     "z**2 / 2 * n",
 )
@@ -193,7 +193,8 @@ verdict.mistake(
     "not expert.any()",
 )
 verdict.mistake(
-    "Compare the share of the random episodes with 0.05, not their number with 5: there may be any number.",
+    "Compare the share of the random episodes with 0.05, not their number with 5: there may be any "
+    "number.",
     "random.mean() > 0.05",
     "random.sum() > 5",
 )
