@@ -5,8 +5,8 @@ import pytest
 from test_viewer import commands
 
 import tasks
-from tasks.world.viewer import mirror, transform
 from tasks.world import World, expert_actions, random_actions
+from tasks.world.viewer import mirror, transform
 
 SCENES = [(name, arm) for name in tasks.TASKS for arm in ("robot", "human")]
 

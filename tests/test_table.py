@@ -75,10 +75,11 @@ def test_finished_runs_are_not_repeated_and_others_go_on(tmp_path, monkeypatch):
 
     monkeypatch.setattr("subprocess.run", run)
     table.run_missing(tmp_path, [("push", 0, "literal"), ("push", 1, "")], jobs=1, episodes=10)
-    assert [" ".join(line).replace(f"{tmp_path}/", "") for line in started] == [
-        "push --seed 1 --threads 1 --out push-1 --episodes 10 --from-scratch --resume",
-        "push --seed 0 --threads 1 --out push-0-literal --episodes 10 --weights push-0 --reward literal",
-    ]
+    first, second = (" ".join(line).replace(f"{tmp_path}/", "") for line in started)
+    both = "--threads 1 --out {} --episodes 10"
+    assert first == f"push --seed 1 {both.format('push-1')} --from-scratch --resume"
+    literal = f"push --seed 0 {both.format('push-0-literal')} --weights push-0 --reward literal"
+    assert second == literal
 
 
 def test_a_run_that_fails_is_named(tmp_path, monkeypatch):
