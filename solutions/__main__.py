@@ -74,7 +74,8 @@ def student(source: Path) -> str:
     config = Config()
     config.NotebookExporter.preprocessors = steps
     config.ClearSolutions.code_stub = {"python": STUB}
-    text, _ = NotebookExporter(config=config).from_filename(str(source))
+    made, _ = NotebookExporter(config=config).from_filename(str(source))
+    text = str(made)
     return text if text.endswith("\n") else text + "\n"
 
 

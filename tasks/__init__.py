@@ -1,13 +1,18 @@
 """The five tasks, registered with Gymnasium when this package is imported."""
 
+from __future__ import annotations
+
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 import gymnasium as gym
 
 from lbw_minimal.training import InputError
+
+if TYPE_CHECKING:
+    from tasks.world import TaskEnv
 
 ROOT = Path(__file__).resolve().parent.parent
 VIDEOS = ROOT / "tasks" / "videos"
@@ -30,6 +35,11 @@ def id_of(name: str) -> str:
     return f"LbW-{name.capitalize()}-v0"
 
 
+def bare(name: str, **options: Any) -> TaskEnv:
+    """The task's environment without Gymnasium's wrappers: its arm, scene and truth at hand."""
+    return cast("TaskEnv", gym.make(id_of(name), **options).unwrapped)
+
+
 def keypoint_env(name: str, reward: str | None = "mended", **options: Any) -> gym.Env:
     """Task `name` as the paper's agent sees it, for any agent that speaks Gymnasium.
 
@@ -50,7 +60,7 @@ def keypoint_env(name: str, reward: str | None = "mended", **options: Any) -> gy
     if reward is None:
         return wrappers.KeypointObservation(env, perception.detect)
     perception.watch(video.read(VIDEOS / name / "expert_01.mp4")[0])
-    robot, _ = record_random(gym.make(id_of(name)).unwrapped, imitate.PACE, seed=0)
+    robot, _ = record_random(bare(name), imitate.PACE, seed=0)
     return imitate.watched(env, perception, robot, reward)[0]
 
 

@@ -61,7 +61,7 @@ class Slide(TaskEnv):
 
     def is_success(self) -> bool:
         speed = np.linalg.norm(self.world.p.getBaseVelocity(self.puck)[0])
-        return self.distance() < SUCCESS and speed < AT_REST
+        return self.distance() < SUCCESS and bool(speed < AT_REST)
 
     def waypoints(self) -> list[Leg]:
         behind = self.object_position() * (1, 1, 0) + (-self.CONTACT - 0.04, 0, 0.02)

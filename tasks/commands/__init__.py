@@ -56,8 +56,8 @@ class Parser(argparse.ArgumentParser):
             if option in parser.options()
         ]
         if owners:
-            owners = " and ".join(owners)
-            raise InputError(f"{self.command}: {option} does nothing here; it belongs to {owners}.")
+            owner = " and ".join(owners)
+            raise InputError(f"{self.command}: {option} does nothing here; it belongs to {owner}.")
         self.error(f"there is no option {option}")
 
     def options(self) -> set[str]:

@@ -13,7 +13,7 @@ import io
 import os
 import time
 from collections.abc import Callable
-from typing import Any
+from typing import Any, cast
 
 import gymnasium as gym
 import numpy as np
@@ -40,9 +40,9 @@ def main(argv: list[str]) -> None:
     """Measure and print. Raises InputError for a mistake in the arguments."""
     seconds = parser().read(argv).seconds
     torch.set_num_threads(1)
-    for frames, what in ((True, "a step with an 84x84 frame"), (False, "a step without a frame")):
-        ours = {f"{task} (ours)": env_steps(our_env(task, frames)) for task in ("push", *TASKS)}
-        contest(what, ours | peers(frames), seconds)
+    for filmed, what in ((True, "a step with an 84x84 frame"), (False, "a step without a frame")):
+        ours = {f"{task} (ours)": env_steps(our_env(task, filmed)) for task in ("push", *TASKS)}
+        contest(what, ours | peers(filmed), seconds)
     frames = np.random.default_rng(0).integers(0, 256, (64, 84, 84, 3), np.uint8)
     contest("an iteration of MUNIT", {"ours": iterations(munit.train, frames, frames)}, seconds)
     contest(
@@ -79,7 +79,7 @@ def installed(module: str, package: str) -> bool:
 
 def env_steps(env: gym.Env) -> Contestant:
     """Steps a second under random actions, resets included."""
-    return lambda seconds: benchmark_step(env, seconds, seed=0)
+    return lambda seconds: benchmark_step(env, cast(int, seconds), seed=0)
 
 
 def our_env(task: str, frames: bool) -> gym.Env:
@@ -103,8 +103,9 @@ def peers(frames: bool) -> dict[str, Contestant]:
     if installed("panda_gym", "panda-gym"):
         import panda_gym  # noqa: F401 (registers its environments)
 
-        size = {"render_width": 84, "render_height": 84}
-        found["panda-gym push"] = gym.make("PandaPush-v3", render_mode="rgb_array", **size)
+        found["panda-gym push"] = gym.make(
+            "PandaPush-v3", render_mode="rgb_array", render_width=84, render_height=84
+        )
     if installed("gymnasium_robotics", "gymnasium-robotics"):
         os.environ.setdefault("MUJOCO_GL", "osmesa")  # a renderer that needs no screen
         import gymnasium_robotics

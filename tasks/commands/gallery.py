@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from html import escape
 from pathlib import Path
+from typing import cast
 
 import gymnasium as gym
 import numpy as np
@@ -21,7 +22,7 @@ from lbw_minimal.report import CSS, demonstration
 from lbw_minimal.training import write_atomic
 from tasks.commands import Parser, make_folder
 from tasks.commands.viewer import perform
-from tasks.world import record_random
+from tasks.world import TaskEnv, record_random
 from tasks.world.scene import FPS
 from tasks.world.viewer import mirror
 
@@ -79,11 +80,11 @@ def section(name: str, out: Path) -> str:
     demo, _ = video.read(tasks.VIDEOS / name / "expert_01.mp4")
     perception = load_perception(tasks.WEIGHTS / name, name)
     perception.watch(demo)
-    robot, _ = record_random(gym.make(tasks.id_of(name)).unwrapped, PACE, seed=0)
+    robot, _ = record_random(tasks.bare(name), PACE, seed=0)
     agent = sac.load(tasks.WEIGHTS / name / "policy.safetensors")
     env, _ = watched(gym.make(tasks.id_of(name)), perception, robot)
     frames, z, won = rollout(env, agent, out / f"{name}-robot.html")
-    human = gym.make(tasks.id_of(name), embodiment="human").unwrapped
+    human = tasks.bare(name, embodiment="human")
     perform(human, out / f"{name}-human.html", "The human, who shows it")
 
     shown = data_uri("image/webp", film(draw_keypoints(frames, z), FPS / 2))
@@ -109,7 +110,7 @@ def iframe(name: str, arm: str) -> str:
 def rollout(env: gym.Env, agent: sac.SAC, path: Path) -> tuple[np.ndarray, np.ndarray, bool]:
     """Frames, keypoints and success of an episode of the policy, whose scene goes to a file."""
     obs, _ = env.reset(seed=SEED)
-    base, K = env.unwrapped, env.get_wrapper_attr("keypoint_reward").z_E.shape[1]
+    base, K = cast(TaskEnv, env.unwrapped), env.get_wrapper_attr("keypoint_reward").z_E.shape[1]
     frames, z, won, over, scene = [], [], False, False, mirror(base)
     scene.snap()
     while not over:

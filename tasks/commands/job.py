@@ -67,7 +67,7 @@ class Job:
     from_scratch: bool
     demo: np.ndarray  # the human video, (N, 84, 84, 3) uint8
     random: np.ndarray  # random human motion, same type; empty with the user's own video
-    perception: Perception | None  # trained; None if it is to be learnt
+    trained: Perception | None  # None if perception is to be learnt
     weights: Path  # folder of trained weights
     command: str  # what makes this run again
     run: Run
@@ -81,7 +81,7 @@ def check(name: str, args: argparse.Namespace, argv: list[str]) -> Job:
     recipe = dataclasses.replace(module.RECIPE, **FAST) if args.fast else module.RECIPE
     recipe = dataclasses.replace(recipe, **read_settings(args.set, from_scratch))
     pick_device(args.device or "cpu")
-    torch.set_num_threads(args.threads or os.cpu_count())
+    torch.set_num_threads(args.threads or os.cpu_count() or 1)
 
     demo, warnings = video.read(args.video or tasks.VIDEOS / name / "expert_01.mp4")
     for warning in warnings:

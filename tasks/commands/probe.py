@@ -11,7 +11,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import gymnasium as gym
 import numpy as np
 
 import tasks
@@ -42,7 +41,7 @@ def main(argv: list[str]) -> None:
     args = parser().read(argv)
     perception = load_perception(args.weights or tasks.WEIGHTS / args.task, args.task)
     perception.watch(video.read(tasks.VIDEOS / args.task / "expert_01.mp4")[0])
-    found = probe(tasks.id_of(args.task), perception, PROBE_SEED + args.seed, args.frames)
+    found = probe(args.task, perception, PROBE_SEED + args.seed, args.frames)
     print(f"{args.task}: R² of a linear map to the true pixels (error in pixels)")
     print(f"{'':10s}" + "".join(f"{name:>16s}" for name in SETS))
     for name in NAMES:
@@ -52,7 +51,7 @@ def main(argv: list[str]) -> None:
             print(f"{what}: {found[what]}")
 
 
-def probe(task_id: str, perception: Perception, seed: int, frames: int = 400) -> dict[str, Any]:
+def probe(name: str, perception: Perception, seed: int, frames: int = 400) -> dict[str, Any]:
     """Figures of one task's perception, by frames filmed with seeds that no training uses.
 
     Returns R^2 per coordinate on robot and translated frames, each with the residual in pixels, and
@@ -61,8 +60,8 @@ def probe(task_id: str, perception: Perception, seed: int, frames: int = 400) ->
     demonstration and in a robot expert's film: they agree if the translated gripper touches what it
     seems to push.
     """
-    robot = gym.make(task_id, embodiment="robot").unwrapped
-    human = gym.make(task_id, embodiment="human").unwrapped
+    robot = tasks.bare(name, embodiment="robot")
+    human = tasks.bare(name, embodiment="human")
     film, truth = in_picture(*record_random(robot, 2 * frames, seed))
     z = perception.detect(film)
     v, v_truth = in_picture(*record_random(human, frames, seed + 1))
@@ -75,12 +74,12 @@ def probe(task_id: str, perception: Perception, seed: int, frames: int = 400) ->
         # place?
         "transfer": (z[:frames], truth[:frames], z_v, v_truth),
     }
-    out = {}
-    for name, (z_fit, px_fit, z_held, px_held) in sets.items():
+    out: dict[str, Any] = {}
+    for where, (z_fit, px_fit, z_held, px_held) in sets.items():
         moves = px_held.std(0) > 0.5  # R^2 says nothing of what does not move
         fit = r2(z_fit, px_fit, z_held, px_held)
         error = pixel_error(z_fit, px_fit, z_held, px_held)
-        out[name] = {
+        out[where] = {
             n: {"r2": round(float(s), 3) if m else None, "px": round(float(e), 2)}
             for n, s, m, e in zip(NAMES, fit, moves, error, strict=True)
         }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import gymnasium as gym
+import numpy as np
 
 import tasks
 from lbw_minimal import video
@@ -27,8 +27,8 @@ def main(argv: list[str]) -> None:
     name = parser().read(argv).task
     folder = tasks.VIDEOS / name
     folder.mkdir(parents=True, exist_ok=True)
-    env = gym.make(tasks.id_of(name), embodiment="human").unwrapped
-    seed, films = 0, []
+    env = tasks.bare(name, embodiment="human")
+    seed, films = 0, list[np.ndarray]()
     while len(films) < EXPERTS:
         if seed == TRIES:
             tries = f"{len(films)} of {seed} tries"

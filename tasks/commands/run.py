@@ -10,20 +10,21 @@ import json
 import resource
 import shutil
 import time
-from typing import Any
+from typing import Any, cast
 
 import gymnasium as gym
 import numpy as np
 import torch
+from gymnasium.spaces import Box
 
 import tasks
 from lbw_minimal import sac
-from lbw_minimal.imitate import PACE, imitate, learn_perception
+from lbw_minimal.imitate import PACE, Perception, imitate, learn_perception
 from lbw_minimal.report import wilson, write_report
 from lbw_minimal.training import InputError, seed_everything
 from tasks.commands.job import TEST_EPISODES, Job, check, parser
 from tasks.commands.probe import PROBE_SEED, probe
-from tasks.world import record_random
+from tasks.world import TaskEnv, record_random
 from tasks.world.viewer import mirror
 
 JITTER = 0.005  # m, start jitter, so that ten test episodes are ten episodes
@@ -33,49 +34,50 @@ TEST_SEED = 1_000_000  # first seed of the test episodes, far from those of trai
 def main(name: str, argv: list[str]) -> None:
     """Run the task `name` with these arguments. Raises InputError for a mistake in them."""
     job = check(name, parser(name).read(argv), argv)
-    robot = perceive(job)
-    agent, env = learn(job, robot)
+    perception, robot = perceive(job)
+    agent, env = learn(job, perception, robot)
     first, scene = test(job, agent, env)
-    report(job, first, scene)
+    report(job, perception, first, scene)
 
 
-def perceive(job: Job) -> np.ndarray:
+def perceive(job: Job) -> tuple[Perception, np.ndarray]:
     """Film the robot's random motion, and train perception if it is to be learnt.
 
-    Returns the film (M, 84, 84, 3) uint8: what perception learns from, or as much as shows the
-    pace.
+    Returns perception and the film (M, 84, 84, 3) uint8: what it learns from, or as much as shows
+    the robot's pace.
     """
     start, seed = time.monotonic(), job.args.seed
-    film_env = gym.make(tasks.id_of(job.name)).unwrapped
+    film_env = tasks.bare(job.name)
     most = job.recipe.robot_frames
     robot, _ = record_random(film_env, most if job.from_scratch else min(PACE, most), seed=seed)
     film_env.close()
     job.run.metrics["stages"]["robot_video"] = round(time.monotonic() - start, 1)
-    if job.perception is None:
+    perception = job.trained
+    if perception is None:
         seed_everything(seed)
-        job.perception = learn_perception(
+        perception = learn_perception(
             job.demo, job.random, robot, job.recipe,
             task=job.name, seed=seed, run=job.run, device=job.args.device or "cpu",
         )  # fmt: skip
     # The probe films the simulated human, whom a perception of another video never saw.
     if job.from_scratch and job.args.video is None and "perception" not in job.run.metrics:
-        job.perception.watch(job.demo)
-        found = probe(tasks.id_of(job.name), job.perception, PROBE_SEED + seed)
+        perception.watch(job.demo)
+        found = probe(job.name, perception, PROBE_SEED + seed)
         job.run.metrics["perception"] = found
         job.run.save()
-    return robot
+    return perception, robot
 
 
-def learn(job: Job, robot: np.ndarray) -> tuple[sac.SAC, gym.Env]:
+def learn(job: Job, perception: Perception, robot: np.ndarray) -> tuple[sac.SAC, gym.Env]:
     """The policy, trained or replayed, and its environment."""
     torch.set_num_threads(1)  # SAC's networks are small: a second thread costs more than it brings
     if job.args.evaluate:
         shutil.copy(job.weights / "policy.safetensors", job.run.out / "policy.safetensors")
     agent, env = imitate(
-        gym.make(tasks.id_of(job.name), jitter=JITTER), job.demo, robot, job.perception, job.recipe,
+        gym.make(tasks.id_of(job.name), jitter=JITTER), job.demo, robot, perception, job.recipe,
         seed=job.args.seed, run=job.run, form=job.args.reward, without=job.args.without,
     )  # fmt: skip
-    sees, given = agent.sizes["obs_dim"], env.observation_space.shape[0]
+    sees, given = agent.sizes["obs_dim"], cast(Box, env.observation_space).shape[0]
     if sees != given:
         why = f"that policy sees {sees} numbers, and {given} come with this reward"
         raise InputError(f"{job.weights}: {why}; give the --reward it was trained with.")
@@ -102,7 +104,7 @@ def evaluate(agent: sac.SAC, env: gym.Env, n: int) -> tuple[list[dict], dict[str
     Success is the paper's: the task is complete at some step. An episode is as long as in training,
     so the rest of a long horizon, when the demonstration is over, gives no second chance.
     """
-    rows, base = [], env.unwrapped
+    rows, base = [], cast(TaskEnv, env.unwrapped)
     film, zs, parts, scene = [], [], [], ""
     for i in range(n):
         z, _ = env.reset(seed=TEST_SEED + i)
@@ -132,7 +134,7 @@ def evaluate(agent: sac.SAC, env: gym.Env, n: int) -> tuple[list[dict], dict[str
     return rows, {"frames": np.stack(film), "z": np.stack(zs), "parts": parts}, scene
 
 
-def report(job: Job, first: dict[str, Any], scene: str) -> None:
+def report(job: Job, perception: Perception, first: dict[str, Any], scene: str) -> None:
     """Write the page of the run and print its result."""
     out, metrics = job.run.out, job.run.metrics
     log = out / "policy_log.json"
@@ -140,8 +142,8 @@ def report(job: Job, first: dict[str, Any], scene: str) -> None:
         out / "report.html",
         task=job.name,
         demo=job.demo,
-        translated=job.perception.translated,
-        z_demo=job.perception.z_E,
+        translated=perception.translated,
+        z_demo=perception.z_E,
         log=json.loads(log.read_text()) if log.exists() else [],  # a replayed policy brings none
         episode=first,
         metrics=metrics,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import gymnasium as gym
 import numpy as np
 
 import tasks
@@ -30,8 +29,8 @@ def main(argv: list[str]) -> None:
     args = parser().read(argv)
     make_folder(args.out)
     path = args.out / f"{args.task}-{args.embodiment}.html"
-    env = gym.make(tasks.id_of(args.task), embodiment=args.embodiment, observation="state")
-    perform(env.unwrapped, path, f"{args.task}: the expert, as a {args.embodiment}", args.seed)
+    env = tasks.bare(args.task, embodiment=args.embodiment, observation="state")
+    perform(env, path, f"{args.task}: the expert, as a {args.embodiment}", args.seed)
     env.close()
     print(f"viewer: {path}")
 

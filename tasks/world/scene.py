@@ -68,7 +68,7 @@ LOOKS = {
 }
 
 
-Colour = tuple[float, float, float, float]  # red, green, blue, opacity, 0 to 1
+Colour = tuple[float, ...]  # red, green, blue, opacity, 0 to 1
 Vector = Sequence[float] | np.ndarray  # (3,)
 
 

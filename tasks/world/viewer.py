@@ -30,6 +30,7 @@ from meshcat.animation import Animation, AnimationClip, AnimationTrack
 
 from lbw_minimal.training import write_atomic
 from tasks.world.env import TaskEnv
+from tasks.world.scene import Vector, World
 
 # m, from the side, like the environments' camera
 EYE, TARGET = (0.5, -1.2, 0.45), (0.42, 0.0, 0.22)
@@ -134,7 +135,7 @@ def read_mesh(path: Path | str) -> np.ndarray:
     return np.array(vertices)[np.array(faces)]
 
 
-def transform(position: Sequence[float], quaternion: Sequence[float]) -> np.ndarray:
+def transform(position: Vector, quaternion: Vector) -> np.ndarray:
     """4x4 matrix of a position in m and a quaternion (x, y, z, w)."""
     T = np.eye(4)
     T[:3, :3] = np.reshape(p.getMatrixFromQuaternion(quaternion), (3, 3))
@@ -173,11 +174,15 @@ class Recorder:
 
     def __init__(self, client: int, bodies: Iterable[int] | None = None):
         self.client, self.eye, self.target = client, EYE, TARGET  # m: where one looks from, and at
-        self.world = None  # of a task's environment, whose scenery is shown for a picture only
+        self.world: World | None = (
+            None  # of a task's environment, whose scenery is shown for a picture only
+        )
         # an array (L, 7) each: position in m and quaternion (x, y, z, w) of every link
-        self.frames = []
+        self.frames: list[np.ndarray] = []
         self.shapes = []  # (link's row, geometry, 4x4 place in the link's frame, rgba)
-        self.links = []  # (body, link) with something to draw; the base is link -1
+        self.links: list[
+            tuple[int, int]
+        ] = []  # (body, link) with something to draw; the base is link -1
         if bodies is None:
             bodies = [p.getBodyUniqueId(i, client) for i in range(p.getNumBodies(client))]
         for body in bodies:
@@ -211,7 +216,7 @@ class Recorder:
         """
         if not self.frames:
             self.snap()
-        tape = []
+        tape: list[Any] = []
         scene = meshcat.Visualizer(window=SimpleNamespace(send=tape.append))
         scene["/Grid"].set_property("visible", False)  # it would lie in the table's top
         scene["/Axes"].set_property("visible", False)
