@@ -74,8 +74,7 @@ def student(source: Path) -> str:
     config = Config()
     config.NotebookExporter.preprocessors = steps
     config.ClearSolutions.code_stub = {"python": STUB}
-    made, _ = NotebookExporter(config=config).from_filename(str(source))
-    text = str(made)
+    text = str(NotebookExporter(config=config).from_filename(str(source))[0])
     return text if text.endswith("\n") else text + "\n"
 
 

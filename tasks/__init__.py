@@ -60,7 +60,9 @@ def keypoint_env(name: str, reward: str | None = "mended", **options: Any) -> gy
     if reward is None:
         return wrappers.KeypointObservation(env, perception.detect)
     perception.watch(video.read(VIDEOS / name / "expert_01.mp4")[0])
-    robot, _ = record_random(bare(name), imitate.PACE, seed=0)
+    film_env = bare(name)
+    robot, _ = record_random(film_env, imitate.PACE, seed=0)
+    film_env.close()
     return imitate.watched(env, perception, robot, reward)[0]
 
 
