@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN = $(VENV)/bin
 
-.PHONY: push reach test slow bench lab notebooks book clean
+.PHONY: push reach test slow peers bench lab notebooks book clean
 
 push reach: $(VENV)/ready
 	$(BIN)/python -m tasks $@
@@ -12,10 +12,13 @@ test: $(VENV)/ready
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/python -m pytest -q -n auto --dist loadfile -m "not slow"
+	$(BIN)/python -m pytest -q -n auto --dist loadfile -m "not slow and not peers"
 
 slow: $(VENV)/ready
 	$(BIN)/python -m pytest -q -m slow
+
+peers: .venv-peers/ready-peers
+	.venv-peers/bin/python -m pytest -q -m peers
 
 bench: $(VENV)/ready
 	$(BIN)/python -m tasks bench
@@ -36,5 +39,10 @@ $(VENV)/ready: requirements.txt
 	$(BIN)/pip install -q -r requirements.txt
 	touch $@
 
+.venv-peers/ready-peers: requirements.txt requirements-peers.txt | $(VENV)/ready
+	$(BIN)/python -m venv .venv-peers
+	.venv-peers/bin/pip install -q -r requirements.txt -r requirements-peers.txt
+	touch $@
+
 clean:
-	rm -rf $(VENV) runs .pytest_cache .ruff_cache .mypy_cache
+	rm -rf $(VENV) .venv-peers runs .pytest_cache .ruff_cache .mypy_cache

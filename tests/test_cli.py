@@ -12,6 +12,7 @@ from lbw_minimal import video
 from lbw_minimal.training import InputError
 from tasks import TASKS, VIDEOS, WEIGHTS, commands
 from tasks.__main__ import main
+from tasks.world import Recording
 
 
 def clip(path, frames, size=84):
@@ -202,7 +203,8 @@ def test_a_folder_of_the_users_own_files_is_never_emptied(tmp_path, capfd):
 def test_filming_ends_when_the_expert_never_succeeds(tmp_path, monkeypatch, capfd):
     monkeypatch.setattr("tasks.VIDEOS", tmp_path)
     monkeypatch.setattr(
-        "tasks.commands.record.record_expert", lambda env, seed: (None, None, False)
+        "tasks.commands.record.record_expert",
+        lambda env, seed: (None, None, Recording(seed, False, None, None, None, [False])),
     )
     assert main(["record", "push"]) == 2
     assert "0 of 45 tries" in capfd.readouterr().err

@@ -73,6 +73,7 @@ def test_unknown_task_and_reward_are_refused(arguments, message):
         tasks.keypoint_env(*arguments)
 
 
+@pytest.mark.peers
 def test_stable_baselines_trains_on_it_in_the_lines_of_the_readme():
     pytest.importorskip("stable_baselines3")
     (lines,) = re.findall(r"(?:^    .*\n)*^    .*stable_baselines3.*\n(?:^    .*\n)*", README, re.M)

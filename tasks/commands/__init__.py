@@ -16,6 +16,7 @@ from lbw_minimal.training import InputError
 
 COMMANDS = {  # each a file in this folder
     "record": "film the human videos of a task again",
+    "export": "the experts' actions, states and frames as a Minari dataset",
     "table": "the results of all tasks; what is missing is run first",
     "ablation": "what each mend of the reward is worth",
     "gallery": "one page with every task's scene, demonstration and rollout",

@@ -1,4 +1,8 @@
-"""Film the human videos of a task: fifteen of the expert, one of random motion."""
+"""Film the human videos of a task: fifteen of the expert, one of random motion.
+
+Beside the films go two files of what they do not show, `experts.npz` and `random.npz`: actions,
+true states and times, from which the same films can be made again.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +12,7 @@ import tasks
 from lbw_minimal import video
 from lbw_minimal.training import InputError
 from tasks.commands import Parser
-from tasks.world import record_expert, record_random
+from tasks.world import Recording, random_takes, record_expert, save_recordings
 from tasks.world.scene import FPS
 
 EXPERTS = 15  # videos of the task being done; the method learns from the first alone
@@ -28,18 +32,20 @@ def main(argv: list[str]) -> None:
     folder = tasks.VIDEOS / name
     folder.mkdir(parents=True, exist_ok=True)
     env = tasks.bare(name, embodiment="human")
-    seed, films = 0, list[np.ndarray]()
-    while len(films) < EXPERTS:
+    seed, experts = 0, list[Recording]()
+    while len(experts) < EXPERTS:
         if seed == TRIES:
-            tries = f"{len(films)} of {seed} tries"
+            tries = f"{len(experts)} of {seed} tries"
             raise InputError(f"{name}: its expert succeeds in {tries}; mend its waypoints.")
-        film, _, done = record_expert(env, seed)
+        film, _, recording = record_expert(env, seed)
         seed += 1
-        if done:
-            films.append(film)
-            video.write(folder / f"expert_{len(films):02d}.mp4", film, FPS)
+        if recording.success[-1]:
+            experts.append(recording)
+            video.write(folder / f"expert_{len(experts):02d}.mp4", film, FPS)
+    save_recordings(folder / "experts.npz", experts)
     # Demonstration and random motion together have Table I's frames.
-    frames = tasks.module(name).RECIPE.human_frames - len(films[0])
-    random, _ = record_random(env, frames, seed=seed, take=20)
-    video.write(folder / "random.mp4", random, FPS)
-    print(f"{name}: {EXPERTS} expert videos and {len(random)} frames of random motion in {folder}")
+    frames = tasks.module(name).RECIPE.human_frames - len(experts[0].states)
+    films, _, takes = zip(*random_takes(env, frames, seed=seed, take=20), strict=True)
+    video.write(folder / "random.mp4", np.concatenate(films), FPS)
+    save_recordings(folder / "random.npz", takes)
+    print(f"{name}: {EXPERTS} expert videos and {frames} frames of random motion in {folder}")

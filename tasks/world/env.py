@@ -183,8 +183,7 @@ class TaskEnv(gym.Env):
     def _observe(self):
         if self.observation == "rgb":
             return self.world.render()
-        parts = self.arm.tip_pose()[0], self.object_position(), self.target_position()
-        return np.concatenate(parts).astype(np.float32)
+        return self.true_state()
 
     def _info(self):
         return {"is_success": bool(self.is_success())}
@@ -192,6 +191,11 @@ class TaskEnv(gym.Env):
     def distance(self) -> float:
         """From the object to where it has to get, in m."""
         return float(np.linalg.norm(self.object_position() - self.target_position()))
+
+    def true_state(self) -> np.ndarray:
+        """Tip, object and target in metres, (9,) float32; for lessons, recordings and tests."""
+        parts = self.arm.tip_pose()[0], self.object_position(), self.target_position()
+        return np.concatenate(parts).astype(np.float32)
 
     def true_pixels(self) -> np.ndarray:
         """Pixels (4,) of tip and object in the image; for plots and tests only."""

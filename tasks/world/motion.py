@@ -1,16 +1,18 @@
 """Who moves the arm in a video: the expert along its waypoints, or chance.
 
 In: an environment and seeds. Out: actions, and films (T, 84, 84, 3) uint8 with the true pixels of
-tip and object, which judge perception and are never learnt from.
+tip and object, which judge perception and are never learnt from, and a recording of what was done.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from itertools import count, islice
 
 import numpy as np
 
 from tasks.world.env import LOW, TaskEnv
+from tasks.world.recording import Recording, film
 from tasks.world.scene import DT, SUBSTEPS
 
 
@@ -55,34 +57,35 @@ def random_actions(rng: np.random.Generator, towards: float = 0.0) -> Iterator[n
 def record_random(
     env: TaskEnv, frames: int, seed: int, take: int = 25
 ) -> tuple[np.ndarray, np.ndarray]:
+    """Film `frames` frames of random motion. Returns the frames (T, 84, 84, 3) uint8 and the true
+    pixels (T, 4) of tip and object."""
+    films, truth, _ = zip(*random_takes(env, frames, seed, take), strict=True)
+    return np.concatenate(films), np.concatenate(truth)
+
+
+def random_takes(
+    env: TaskEnv, frames: int, seed: int, take: int
+) -> Iterator[tuple[np.ndarray, np.ndarray, Recording]]:
     """Film `frames` frames of random motion in takes of `take` frames, the object put anew for
-    each.
-
-    A take that starts next to the object moves towards it for its first half. Returns the frames
-    (T, 84, 84, 3) uint8 and the true pixels (T, 4) of tip and object.
-    """
+    each. Yields what `film` returns, for each take."""
     rng = np.random.default_rng(seed)
-    film, truth = [], []
-    while len(film) < frames:
-        film.append(env.reset(seed=int(rng.integers(2**31)), options={"scatter": True})[0])
-        truth.append(env.true_pixels())
-        gap = env.object_position() - env.arm.goal
-        low = env.arm.goal[2] < env.WORKSPACE[0][2] + LOW
-        beside = env.CONTACT and abs(gap[0]) < env.CONTACT + 0.05 and low
-        seek, roam = random_actions(rng, np.sign(gap[0])), random_actions(rng)
-        for i in range(1, take):
-            film.append(env.step(next(seek if beside and i < take / 2 else roam))[0])
-            truth.append(env.true_pixels())
-    return np.stack(film[:frames]), np.stack(truth[:frames])
+    for start in range(0, frames, take):
+        place = int(rng.integers(2**31))
+        steps = min(take, frames - start) - 1
+        yield film(env, place, islice(_wander(env, rng, take), steps), scatter=True)
 
 
-def record_expert(env: TaskEnv, seed: int) -> tuple[np.ndarray, np.ndarray, bool]:
-    """Film one human-like expert episode. Returns frames, true pixels, and whether it succeeded."""
-    film = [env.reset(seed=seed)[0]]
-    truth, done = [env.true_pixels()], False
-    for action in expert_actions(env, np.random.default_rng(seed)):
-        frame, _, _, _, info = env.step(action)
-        film.append(frame)
-        truth.append(env.true_pixels())
-        done = info["is_success"]
-    return np.stack(film), np.stack(truth), done
+def _wander(env, rng, take):
+    """Random actions; a take that starts next to the object moves towards it for its first
+    half."""
+    gap = env.object_position() - env.arm.goal
+    low = env.arm.goal[2] < env.WORKSPACE[0][2] + LOW
+    beside = env.CONTACT and abs(gap[0]) < env.CONTACT + 0.05 and low
+    seek, roam = random_actions(rng, np.sign(gap[0])), random_actions(rng)
+    for i in count(1):
+        yield next(seek if beside and i < take / 2 else roam)
+
+
+def record_expert(env: TaskEnv, seed: int) -> tuple[np.ndarray, np.ndarray, Recording]:
+    """Film one human-like expert episode. Returns what `film` does."""
+    return film(env, seed, expert_actions(env, np.random.default_rng(seed)))
