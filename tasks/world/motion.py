@@ -24,8 +24,8 @@ def expert_actions(env: TaskEnv, rng: np.random.Generator | None = None) -> Iter
     """
     start = env.arm.goal.copy()
     for end, seconds, dosed in env.waypoints():
-        bend, human = np.zeros(3), rng is not None and not dosed
-        if human:
+        bend = np.zeros(3)
+        if rng is not None and not dosed:
             seconds *= rng.uniform(0.9, 1.15)
             bend[[0, 2]] = rng.uniform(-1, 1, 2) * 0.08 * abs(end - start)[[2, 0]]
         steps = max(1, round(seconds / (DT * SUBSTEPS)))
@@ -35,7 +35,7 @@ def expert_actions(env: TaskEnv, rng: np.random.Generator | None = None) -> Iter
             wanted = start + s * (end - start) + np.sin(np.pi * s) * bend
             yield np.clip((wanted - env.arm.goal) / env.STEP, -1, 1).astype(np.float32)
         start = np.asarray(end, float)
-        if human and rng.random() < 0.4:
+        if rng is not None and not dosed and rng.random() < 0.4:
             for _ in range(rng.integers(1, 4)):
                 yield np.zeros(3, np.float32)
 

@@ -47,9 +47,9 @@ def film(
         kept.append((frame, env.true_pixels(), env.true_state(), info["is_success"]))
         played.append(action)
     frames, pixels, states, success = (np.stack(part) for part in zip(*kept, strict=True))
-    played = np.array(played, np.float32).reshape(-1, 3)
+    done = np.array(played, np.float32).reshape(-1, 3)
     times = np.arange(len(frames)) * (DT * SUBSTEPS)
-    return frames, pixels, Recording(seed, scatter, played, states, times, success)
+    return frames, pixels, Recording(seed, scatter, done, states, times, success)
 
 
 def save_recordings(path: Path | str, recordings: list[Recording]) -> None:
