@@ -3,7 +3,7 @@
 import re
 
 import tasks
-from tasks import gallery
+from tasks.commands import gallery
 
 
 def test_the_page_shows_a_task_with_its_two_scenes(tmp_path, monkeypatch):
