@@ -294,7 +294,7 @@ class Recorder:
             f'<img alt="the scene" src="{png}"></picture>'
         )
 
-    def save(self, path: Path | str, title: str = "PyBullet scene", **options) -> None:
+    def save(self, path: Path | str, title: str = "PyBullet scene", **options: float) -> None:
         """Write `html(title, **options)` to a file, whole or not at all."""
         write_atomic(path, self.html(title, **options))
 
