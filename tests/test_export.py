@@ -2,7 +2,6 @@
 
 import sys
 
-import gymnasium as gym
 import numpy as np
 import pytest
 
@@ -17,7 +16,7 @@ def two_experts(tmp_path, monkeypatch):
     monkeypatch.setattr("tasks.VIDEOS", tmp_path)
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "minari"))
     (tmp_path / "reach").mkdir()
-    env = gym.make("LbW-Reach-v0", embodiment="human", observation="state").unwrapped
+    env = tasks.bare("reach", embodiment="human", observation="state")
     experts = [record_expert(env, seed)[2] for seed in (3, 5)]
     env.close()
     save_recordings(tmp_path / "reach" / "experts.npz", experts)

@@ -36,7 +36,7 @@ def test_the_method_imports_no_simulator(path):
 @pytest.mark.parametrize("path", PACKAGE, ids=lambda p: p.name)
 def test_the_method_names_nothing_of_the_simulators_state(path):
     """Success may be logged, by `info["is_success"]`; positions, poses, joints are off limits."""
-    words = ("true_pixels", "object_position", "target_position", "tip_pose")
+    words = ("true_pixels", "true_state", "object_position", "target_position", "tip_pose")
     words += ("unwrapped", "waypoints")
     assert not [w for w in words if w in path.read_text()]
 

@@ -1,6 +1,5 @@
 """What is kept of an episode beside its film: it is played again, and learnt from."""
 
-import gymnasium as gym
 import numpy as np
 import pytest
 
@@ -24,7 +23,7 @@ def shipped(name):
 def test_the_shipped_experts_played_again_go_where_they_went(name, every):
     experts = shipped(name)
     assert len(experts) == 15
-    env = gym.make(tasks.id_of(name), embodiment="human").unwrapped
+    env = tasks.bare(name, embodiment="human")
     for i in range(0, 15, every):
         seed, scatter, actions, states, times, success = experts[i]
         frames, _, again = film(env, seed, actions, scatter)
@@ -41,7 +40,7 @@ def test_the_shipped_random_motion_played_again_shows_the_shipped_film(name):
     takes = load_recordings(tasks.VIDEOS / name / "random.npz")
     shown = video.read(tasks.VIDEOS / name / "random.mp4")[0]
     assert sum(len(take.states) for take in takes) == len(shown)
-    env = gym.make(tasks.id_of(name), embodiment="human").unwrapped
+    env = tasks.bare(name, embodiment="human")
     for take, part in ((takes[0], shown[:20]), (takes[-1], shown[-len(takes[-1].states) :])):
         frames, _, _ = film(env, take.seed, take.actions, take.scatter)
         assert differ(frames, part) < 5e-4
@@ -55,7 +54,7 @@ def differ(frames, shown):
 
 
 def test_a_recording_from_its_file_makes_the_same_film(tmp_path):
-    env = gym.make("LbW-Slide-v0", embodiment="human").unwrapped
+    env = tasks.bare("slide", embodiment="human")
     films = [record_expert(env, seed=3), *random_takes(env, 30, seed=5, take=20)]
     save_recordings(tmp_path / "kept.npz", [recording for _, _, recording in films])
     kept = load_recordings(tmp_path / "kept.npz")
@@ -70,7 +69,7 @@ def test_a_recording_from_its_file_makes_the_same_film(tmp_path):
 
 
 def test_a_recording_is_what_the_environment_said():
-    env = gym.make("LbW-Reach-v0", embodiment="human", observation="state").unwrapped
+    env = tasks.bare("reach", embodiment="human", observation="state")
     observations, _, recording = record_expert(env, seed=0)
     np.testing.assert_array_equal(recording.states, observations)
     assert recording.actions.shape == (len(observations) - 1, 3)
@@ -81,7 +80,7 @@ def test_a_recording_is_what_the_environment_said():
 
 
 def test_the_same_recordings_make_the_same_file(tmp_path):
-    env = gym.make("LbW-Reach-v0", observation="state").unwrapped
+    env = tasks.bare("reach", observation="state")
     for name in ("a", "b"):
         save_recordings(tmp_path / name, [record_expert(env, seed=1)[2]])
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
@@ -92,7 +91,7 @@ def test_a_file_of_recordings_that_is_missing_or_cut_is_named(tmp_path):
     path = tmp_path / "experts.npz"
     with pytest.raises(InputError, match=r"no such file; python -m tasks record"):
         load_recordings(path)
-    env = gym.make("LbW-Reach-v0", observation="state").unwrapped
+    env = tasks.bare("reach", observation="state")
     save_recordings(path, [record_expert(env, seed=1)[2]])
     env.close()
     whole = path.read_bytes()
@@ -117,7 +116,7 @@ def test_the_robot_reaches_the_ball_by_the_humans_recorded_actions():
     actions = np.concatenate([recording.actions for recording in experts])
     W = np.linalg.lstsq(x, actions, rcond=None)[0]
 
-    env = gym.make("LbW-Reach-v0", observation="state", jitter=0.005).unwrapped
+    env = tasks.bare("reach", observation="state", jitter=0.005)
     for seed in range(3):
         ends = []
         for policy in (lambda state: features(state[None])[0] @ W, lambda _: actions.mean(0)):

@@ -6,14 +6,11 @@ Each recording is played again, so that frames and rewards are the environment's
 from __future__ import annotations
 
 import warnings
-from typing import cast
-
-import gymnasium as gym
 
 import tasks
 from lbw_minimal.training import InputError
 from tasks.commands import Parser
-from tasks.world import TaskEnv, film, load_recordings
+from tasks.world import film, load_recordings
 
 
 def parser() -> Parser:
@@ -44,12 +41,11 @@ def main(argv: list[str]) -> None:
         raise InputError(
             f"{dataset}: Minari has this dataset already; minari delete {dataset} removes it."
         )
-    env = gym.make(tasks.id_of(name), embodiment="human")
-    bare = cast(TaskEnv, env.unwrapped)
+    env = tasks.bare(name, embodiment="human")
     episodes = []
     for recording in recordings:
         seed, scatter, actions, *_ = recording
-        frames, _, played = film(bare, seed, actions, scatter)
+        frames, _, played = film(env, seed, actions, scatter)
         if not played.success[-1]:
             raise InputError(
                 f"{source}: played again, seed {seed} fails; python -m tasks record {name} "

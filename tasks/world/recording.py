@@ -43,16 +43,16 @@ def film(
     frame, info = env.reset(seed=seed, options={"scatter": scatter})
     kept, played = [(frame, env.true_pixels(), env.true_state(), info["is_success"])], []
     for action in actions:
-        frame, _, _, _, info = env.step(action)
+        played.append(np.array(action, np.float32))  # what is kept is what was played
+        frame, _, _, _, info = env.step(played[-1])
         kept.append((frame, env.true_pixels(), env.true_state(), info["is_success"]))
-        played.append(action)
     frames, pixels, states, success = (np.stack(part) for part in zip(*kept, strict=True))
     done = np.array(played, np.float32).reshape(-1, 3)
     times = np.arange(len(frames)) * (DT * SUBSTEPS)
     return frames, pixels, Recording(seed, scatter, done, states, times, success)
 
 
-def save_recordings(path: Path | str, recordings: list[Recording]) -> None:
+def save_recordings(path: Path | str, recordings: Iterable[Recording]) -> None:
     """Write recordings as an npz file, the same bytes for the same recordings.
 
     `seeds`, `scatter` and `lengths` have one entry an episode. `states`, `times` and `success` hold
