@@ -268,8 +268,8 @@ timed_r1.mistake(
     "min(t + 1, len(z_E) - 2)",
 )
 timed_r1.mistake(
-    "You add up one distance per keypoint: the distance is the length of all 2K numbers, as in Eq. "
-    "9.",
+    "You add up one distance per keypoint: the distance is the length of all 2K numbers, as in "
+    "Eq. 9.",
     "np.linalg.norm(z_next - target)",
     "np.linalg.norm(z_next - target, axis=1).sum()",
 )
