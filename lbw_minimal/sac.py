@@ -11,18 +11,18 @@ without noise in which raw and averaged actors of the best episodes compete for 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from copy import deepcopy
-from itertools import pairwise
+from pathlib import Path
+from typing import Any
 
+import gymnasium as gym
 import numpy as np
 import torch
-import torch.nn.functional as F
-from torch import nn
 
-from .training import Checkpoint, load_state, progress, save_state, seed_everything
+from lbw_minimal.sac_networks import Actor, TwinCritic
+from lbw_minimal.training import Checkpoint, load_state, progress, save_state, seed_everything
 
-# exp(-5) acts as good as deterministic; exp(2) is past tanh's ends
-LOG_STD_MIN, LOG_STD_MAX = -5.0, 2.0
 # aimed at, per number of an action; the published -1 is noise of 0.09, too much to dose a hit
 ENTROPY = -2.0
 WINDOW = 10  # episodes whose mean return makes the actors at their end candidates
@@ -35,84 +35,38 @@ FALL_FROM = 0.3
 MIN_OBS_STD = 0.02
 
 
-class Actor(nn.Module):
-    """pi(a|s) = tanh(Normal(mean(s), std(s))), every action in (-1, 1)."""
-
-    def __init__(self, obs_dim: int, action_dim: int, width: int):
-        super().__init__()
-        self.net = nn.Sequential(
-            *(nn.Linear(obs_dim, width), nn.ReLU()),
-            *(nn.Linear(width, width), nn.ReLU()),
-            nn.Linear(width, 2 * action_dim),
-        )
-
-    def forward(self, s):
-        mean, log_std = self.net(s).chunk(2, dim=-1)  # (B, A), (B, A)
-        # A tanh keeps a gradient at both bounds; a hard clamp would not.
-        log_std = LOG_STD_MIN + 0.5 * (LOG_STD_MAX - LOG_STD_MIN) * (torch.tanh(log_std) + 1)
-        return mean, log_std
-
-    def sample(self, s):
-        """Draw actions (B, A) with their log-density (B,), differentiable in the weights."""
-        mean, log_std = self(s)
-        noise = torch.randn_like(mean)
-        u = mean + log_std.exp() * noise
-        # log N(u) - log |da/du|, and log(1 - tanh(u)^2) = 2 (log 2 - u - softplus(-2u)) never
-        # overflows
-        log_normal = -0.5 * noise.square() - log_std - 0.5 * math.log(2 * math.pi)
-        log_slope = 2 * (math.log(2) - u - F.softplus(-2 * u))
-        return torch.tanh(u), (log_normal - log_slope).sum(-1)
-
-
-class TwinCritic(nn.Module):
-    """Two independent Q(s, a) as one batched network: half the calls of two modules."""
-
-    def __init__(self, obs_dim: int, action_dim: int, width: int):
-        super().__init__()
-        sizes = [obs_dim + action_dim, width, width, 1]
-        self.weights, self.biases = nn.ParameterList(), nn.ParameterList()
-        for n_in, n_out in pairwise(sizes):
-            bound = n_in**-0.5  # as nn.Linear
-            self.weights.append(torch.empty(2, n_in, n_out).uniform_(-bound, bound))
-            self.biases.append(torch.empty(2, 1, n_out).uniform_(-bound, bound))
-
-    def forward(self, s, a, frozen: bool = False):
-        """Q_1 and Q_2 (2, B) of s (B, S) and a (B, A); `frozen` lets gradients pass to `a`
-        alone."""
-        W, b = ([p.detach() if frozen else p for p in ps] for ps in (self.weights, self.biases))
-        x = torch.cat([s, a], -1).expand(2, -1, -1)  # (2, B, S + A)
-        for i in range(2):
-            # The bias goes in before LayerNorm, which forgets scale: Q(s, a) would equal Q(2s, 2a).
-            x = F.relu(F.layer_norm(torch.baddbmm(b[i], x, W[i]), W[i].shape[-1:]))  # (2, B, width)
-        return torch.baddbmm(b[2], x, W[2]).squeeze(-1)  # (2, B)
+Batch = dict[str, torch.Tensor]  # transitions: obs, action, reward, next_obs, terminal
 
 
 class ReplayBuffer:
-    """The last `capacity` transitions in arrays; `terminal` is 1 only where the task itself
-    ended."""
+    """The last `capacity` transitions in arrays; `terminal` is 1 where the task itself ended."""
 
     def __init__(self, obs_dim: int, action_dim: int, capacity: int):
-        shapes = {"obs": (obs_dim,), "action": (action_dim,), "next_obs": (obs_dim,)}
-        shapes |= {"reward": (), "terminal": ()}
+        shapes: dict[str, tuple[int, ...]] = {"obs": (obs_dim,), "action": (action_dim,)}
+        shapes |= {"next_obs": (obs_dim,), "reward": (), "terminal": ()}
         self.data = {k: np.zeros((capacity, *s), np.float32) for k, s in shapes.items()}
         self.capacity, self.added = capacity, 0
 
-    def __len__(self):
+    def __len__(self) -> int:
         return min(self.added, self.capacity)
 
-    def add(self, **transition) -> None:
+    def add(self, **transition: Any) -> None:
+        """Keep a transition: obs, action, reward, next_obs, terminal."""
         for k, v in self.data.items():
             v[self.added % self.capacity] = transition[k]
         self.added += 1
 
-    def sample(self, rng: np.random.Generator, batch: int) -> dict[str, torch.Tensor]:
+    def sample(self, rng: np.random.Generator, batch: int) -> Batch:
+        """`batch` of the transitions, drawn with replacement."""
         i = rng.integers(len(self), size=batch)
         return {k: torch.from_numpy(v[i]) for k, v in self.data.items()}
 
-    def state(self) -> dict:
+    def state_dict(self) -> dict[str, Any]:
+        """The transitions, and how many there have been."""
         return {"added": self.added, "data": {k: v[: len(self)] for k, v in self.data.items()}}
 
-    def load_state(self, state: dict) -> None:
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Hold what the buffer held whose `state_dict` came through a checkpoint."""
         self.added = state["added"]
         for k, v in state["data"].items():
             self.data[k][: len(self)] = v.numpy()
@@ -148,21 +102,25 @@ class SAC:
         self.target_entropy = ENTROPY * action_dim
         self.test_actor = deepcopy(self.actor).requires_grad_(False)
         self.target = deepcopy(self.critic).requires_grad_(False)
-        # One optimizer for all three: the calls, not the arithmetic, are what a small network
-        # costs.
+        # One optimizer for all: the calls, not the arithmetic, are what a small network costs.
         groups = [
             {"params": [*self.critic.parameters(), self.log_alpha], "lr": critic_lr},
             {"params": list(self.actor.parameters()), "lr": actor_lr},
         ]
         self.optimizer = torch.optim.Adam(groups, fused=True)
         self.rates = critic_lr, actor_lr
-        self._slow = [list(m.parameters()) for m in (self.target, self.test_actor)]
-        self._fast = [list(m.parameters()) for m in (self.critic, self.actor)]
+        self._slow: list[list[torch.Tensor]] = [
+            list(m.parameters()) for m in (self.target, self.test_actor)
+        ]
+        self._fast: list[list[torch.Tensor]] = [
+            list(m.parameters()) for m in (self.critic, self.actor)
+        ]
         self.obs_count = 0
         self.obs_mean, self.obs_var = torch.zeros(obs_dim), torch.ones(obs_dim)
 
     @property
     def alpha(self) -> float:
+        """The temperature: what a unit of entropy is worth, in rewards."""
         return self.log_alpha.exp().item()
 
     def slow_down(self, passed: float) -> None:
@@ -171,36 +129,34 @@ class SAC:
         for group, rate in zip(self.optimizer.param_groups, self.rates, strict=True):
             group["lr"] = share * rate
 
-    def observe(self, obs) -> None:
+    def observe(self, obs: np.ndarray) -> None:
         """Take one observation (S,) into the running mean and variance (Welford)."""
         self.obs_count += 1
         delta, share = torch.as_tensor(obs) - self.obs_mean, 1 / self.obs_count
         self.obs_mean = self.obs_mean + share * delta
         self.obs_var = (1 - share) * (self.obs_var + share * delta.square())
 
-    def normalise(self, obs):
+    def normalise(self, obs: torch.Tensor) -> torch.Tensor:
+        """Observations (..., S) with mean 0 and variance 1 over all observed so far."""
         return ((obs - self.obs_mean) / self.obs_var.sqrt().clamp(min=MIN_OBS_STD)).clamp(-5, 5)
 
     @torch.no_grad()
-    def act(self, obs, deterministic: bool = False) -> np.ndarray:
-        """Action (A,) float32 in [-1, 1] for an observation (S,): a sample, or the test actor's
-        mean."""
+    def act(self, obs: np.ndarray, deterministic: bool = False) -> np.ndarray:
+        """Action (A,) in [-1, 1] for an observation (S,): a sample, or the test actor's mean."""
         s = self.normalise(torch.as_tensor(obs, dtype=torch.float32))
         a = torch.tanh(self.test_actor(s)[0]) if deterministic else self.actor.sample(s)[0]
         return a.numpy()
 
-    def critic_target(self, batch) -> torch.Tensor:
-        """y = r + gamma (1 - terminal) (min_i Q'_i(s', a') - alpha log pi(a'|s')), a' ~ pi(s').
-        (B,)"""
+    def critic_target(self, batch: Batch) -> torch.Tensor:
+        """y (B,) = r + gamma (1 - terminal) (min_i Q'_i(s', a') - alpha log pi(a'|s')), a' ~ pi."""
         with torch.no_grad():
             s_next = self.normalise(batch["next_obs"])
             a_next, log_pi = self.actor.sample(s_next)
             value = self.target(s_next, a_next).amin(0) - self.log_alpha.exp() * log_pi
             return batch["reward"] + self.gamma * (1 - batch["terminal"]) * value
 
-    def update(self, batch: dict[str, torch.Tensor]) -> dict[str, float]:
-        """One gradient step of critics, actor and temperature on a batch of transitions; returns
-        losses."""
+    def update(self, batch: Batch) -> dict[str, float]:
+        """One gradient step of critics, actor and temperature; returns what the log is told."""
         s, y = self.normalise(batch["obs"]), self.critic_target(batch)
         critic_loss = (self.critic(s, batch["action"]) - y).square().mean(1).sum()
 
@@ -233,12 +189,13 @@ class SAC:
             n: getattr(self, n) for n in ("actor", "critic", "test_actor", "target", "optimizer")
         }
 
-    def state(self) -> dict:
-        """All that `load_state` needs to go on exactly here."""
+    def state_dict(self) -> dict[str, Any]:
+        """All that `load_state_dict` needs to go on exactly here."""
         rest = {n: getattr(self, n) for n in ("log_alpha", "obs_mean", "obs_var", "obs_count")}
         return {n: m.state_dict() for n, m in self._modules().items()} | rest
 
-    def load_state(self, state: dict) -> None:
+    def load_state_dict(self, state: dict[str, Any]) -> None:
+        """Be the agent whose `state_dict` came through a file."""
         for n, m in self._modules().items():
             m.load_state_dict(state[n])
         # in place: the optimizer holds this very tensor
@@ -248,108 +205,119 @@ class SAC:
         )
 
 
-def save(path, sac: SAC) -> None:
+def save(path: Path | str, sac: SAC) -> None:
     """Write the agent to one file."""
-    save_state(path, {"sizes": sac.sizes, "agent": sac.state()})
+    save_state(path, {"sizes": sac.sizes, "agent": sac.state_dict()})
 
 
-def load(path) -> SAC:
+def load(path: Path | str) -> SAC:
     """The agent that `save` wrote. Raises InputError if the file is missing or damaged."""
     saved = load_state(path)
     sac = SAC(**saved["sizes"])
-    sac.load_state(saved["agent"])
+    sac.load_state_dict(saved["agent"])
     return sac
 
 
 def train(
-    env,
+    env: gym.Env,
     *,
     steps: int,
     seed: int,
     checkpoint: Checkpoint | None = None,
-    evaluate=None,
+    evaluate: Callable[[SAC], dict[str, float]] | None = None,
     evaluate_every: int = 10,
     updates: int = 4,
     random_steps: int = 500,
     batch: int = 128,
-    **recipe,
+    **recipe: Any,
 ) -> tuple[SAC, list[dict]]:
     """Train on `env` until the first episode that ends at or after `steps` environment steps.
 
     env: observations (S,) float32, actions (A,) in [-1, 1]. Its `info["reward_parts"]` and
     `info["is_success"]`, that of an episode's last step, go to the log and nowhere else. updates:
-    gradient steps an environment step, after `random_steps` uniformly random ones. evaluate(sac) ->
-    dict joins the log every `evaluate_every` episodes. recipe: arguments of `SAC`. Returns the
-    agent and the log, a row an episode. A resumed run does what the killed one would have done:
-    each episode starts from (seed, episode), and checkpoints are taken between episodes. The
-    agent's test-time actor is chosen at the end, by return: see `best_actor`.
+    gradient steps an environment step, after `random_steps` uniformly random ones. evaluate(sac)
+    joins the log every `evaluate_every` episodes. recipe: arguments of `SAC`. Returns the agent and
+    the log, a row an episode. A resumed run does what the killed one would have done: each episode
+    starts from (seed, episode), and checkpoints are taken between episodes. The agent's test-time
+    actor is chosen at the end, by return: see `best_actor`.
     """
-    checkpoint = checkpoint or Checkpoint(None)
-    rng = seed_everything(seed)
-    obs_dim, action_dim = env.observation_space.shape[0], env.action_space.shape[0]
-    sac = SAC(obs_dim, action_dim, **recipe)
-    buffer = ReplayBuffer(obs_dim, action_dim, steps + 1000)  # a short run can keep all it has seen
-    log, step, candidates = [], 0, []
-    if saved := checkpoint.load():
-        sac.load_state(saved["sac"])
-        candidates = saved["candidates"]
-        buffer.load_state(saved["buffer"])
-        rng.bit_generator.state, log, step = saved["rng"], saved["log"], saved["step"]
-
-    def state():
-        rest = {"rng": rng.bit_generator.state, "log": log, "step": step, "candidates": candidates}
-        return {"sac": sac.state(), "buffer": buffer.state()} | rest
-
-    bar = progress(steps, "policy", step)
-    while step < steps:
+    checkpoint, rng = checkpoint or Checkpoint(None), seed_everything(seed)
+    sac = SAC(_length(env.observation_space), _length(env.action_space), **recipe)
+    # A short run can keep all it has seen.
+    buffer = ReplayBuffer(sac.sizes["obs_dim"], sac.sizes["action_dim"], steps + 1000)
+    stateful = {"sac": sac, "buffer": buffer, "rng": rng}
+    now, state = checkpoint.resume(stateful, step=0, log=[], candidates=[])
+    bar = progress(steps, "policy", now.step)
+    while now.step < steps:
         rows, losses, ended = [], [], False
-        obs, _ = env.reset(seed=int(np.random.SeedSequence([seed, len(log)]).generate_state(1)[0]))
+        obs, _ = env.reset(seed=_seed(seed, len(now.log)))
         sac.observe(obs)
         while not ended:
-            explore = step < random_steps
-            action = rng.uniform(-1, 1, action_dim).astype(np.float32) if explore else sac.act(obs)
+            random = now.step < random_steps
+            action = _uniform(rng, env) if random else sac.act(obs)
             next_obs, reward, terminal, truncated, info = env.step(action)
             # `truncated` stays out: the time limit is the clock's doing, and s' keeps its value.
             buffer.add(obs=obs, action=action, reward=reward, next_obs=next_obs, terminal=terminal)
             sac.observe(next_obs)
             rows.append({"reward": float(reward), **info.get("reward_parts", {})})
-            obs, ended, step = next_obs, terminal or truncated, step + 1
-            if step > random_steps:
-                sac.slow_down(step / steps)
+            obs, ended, now.step = next_obs, terminal or truncated, now.step + 1
+            if now.step > random_steps:
+                sac.slow_down(now.step / steps)
                 losses += [sac.update(buffer.sample(rng, batch)) for _ in range(updates)]
-        row = {"episode": len(log), "step": step, "length": len(rows)}
-        row |= {
-            "return": sum(r["reward"] for r in rows),
-            "success": bool(info.get("is_success", False)),
-        }
-        for many in (rows, losses):
-            row |= {k: float(np.mean([r[k] for r in many])) for k in (many[0] if many else ())}
-        if evaluate and len(log) % evaluate_every == evaluate_every - 1:
-            row |= evaluate(sac)
-        log.append(row)
-        if len(log) % WINDOW == 0:
-            mean = float(np.mean([r["return"] for r in log[-WINDOW:]]))
-            candidates.append({"return": mean, "actors": sac.actors()})
-            candidates = sorted(candidates, key=lambda c: -c["return"])[:CANDIDATES]
-        bar.set_postfix_str(f"return {row['return']:.2f}", refresh=False)
+        now.log.append(_row(len(now.log), now.step, rows, losses, info))
+        if evaluate and len(now.log) % evaluate_every == 0:
+            now.log[-1] |= evaluate(sac)
+        if len(now.log) % WINDOW == 0:
+            now.candidates = _best(now.candidates, now.log, sac)
+        bar.set_postfix_str(f"return {now.log[-1]['return']:.2f}", refresh=False)
         bar.update(len(rows))
         checkpoint.save(state)
     bar.close()
     checkpoint.save(state, force=True)
-    actors = [actor for c in candidates for actor in c["actors"]] + sac.actors()
+    actors = [actor for c in now.candidates for actor in c["actors"]] + sac.actors()
     sac.test_actor.load_state_dict(best_actor(env, sac, actors, seed))
-    return sac, log
+    return sac, now.log
 
 
-def best_actor(env, sac: SAC, actors: list[dict], seed: int) -> dict:
-    """Of `actors`, state dicts, the one that earns most in `TRIALS` episodes without noise, alike
-    for all."""
+def _length(space):
+    """Of the vectors in a Box."""
+    return space.shape[0]
+
+
+def _uniform(rng, env):
+    """An action that knows nothing."""
+    return rng.uniform(-1, 1, env.action_space.shape).astype(np.float32)
+
+
+def _seed(*key):
+    """A seed of its own for every key, such as (seed, episode)."""
+    return int(np.random.SeedSequence(key).generate_state(1)[0])
+
+
+def _row(episode, step, rows, losses, info):
+    """An episode in the log: sums and means of its steps and updates."""
+    row = {"episode": episode, "step": step, "length": len(rows)}
+    row |= {"return": sum(r["reward"] for r in rows), "success": bool(info.get("is_success"))}
+    for many in (rows, losses):
+        row |= {k: float(np.mean([r[k] for r in many])) for k in (many[0] if many else ())}
+    return row
+
+
+def _best(candidates, log, sac):
+    """The candidates with the highest mean return, the present actors among them."""
+    mean = float(np.mean([r["return"] for r in log[-WINDOW:]]))
+    candidates = [*candidates, {"return": mean, "actors": sac.actors()}]
+    return sorted(candidates, key=lambda c: -c["return"])[:CANDIDATES]
+
+
+def best_actor(env: gym.Env, sac: SAC, actors: list[dict], seed: int) -> dict:
+    """Of `actors`, state dicts, the one that earns most in `TRIALS` episodes without noise."""
 
     def mean_return(actor):
         sac.test_actor.load_state_dict(actor)
         total = 0.0
-        for i in range(TRIALS):
-            obs, _ = env.reset(seed=int(np.random.SeedSequence([seed, i, 1]).generate_state(1)[0]))
+        for i in range(TRIALS):  # the same starts for all
+            obs, _ = env.reset(seed=_seed(seed, i, 1))
             ended = False
             while not ended:
                 obs, reward, terminal, truncated, _ = env.step(sac.act(obs, deterministic=True))
