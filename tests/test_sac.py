@@ -156,6 +156,52 @@ def test_the_actors_loss_does_not_train_the_critics():
     assert any(p.grad.abs().sum() > 0 for p in sac.actor.parameters())
 
 
+def plain_update(agent, adams, batch):
+    """Notebook 2's: a loss, a gradient and an optimizer for each part, and no `frozen`."""
+    s, y = agent.normalise(batch["obs"]), agent.critic_target(batch)
+    critic_loss = (agent.critic(s, batch["action"]) - y).square().mean(1).sum()
+    a, log_pi = agent.actor.sample(s)
+    alpha = agent.log_alpha.exp()
+    actor_loss = (alpha.detach() * log_pi - agent.critic(s, a).amin(0)).mean()
+    alpha_loss = alpha * (-log_pi.detach().mean() - agent.target_entropy)
+    of_critic, of_actor, of_alpha = adams
+    of_actor.zero_grad()
+    actor_loss.backward()
+    of_critic.zero_grad()  # what the actor's loss left in the critics
+    critic_loss.backward()
+    of_alpha.zero_grad()
+    alpha_loss.backward()
+    for adam in adams:
+        adam.step()
+    with torch.no_grad():
+        for slow, quick, pace in (
+            (agent.target, agent.critic, agent.tau),
+            (agent.test_actor, agent.actor, agent.average),
+        ):
+            for p, q in zip(slow.parameters(), quick.parameters(), strict=True):
+                p += pace * (q - p)
+
+
+def test_the_fast_update_is_that_of_three_optimizers_in_plain_lines():
+    fast = small()
+    plain = deepcopy(fast)
+    parts = plain.critic.parameters(), plain.actor.parameters(), [plain.log_alpha]
+    adams = [torch.optim.Adam(part, 1e-3) for part in parts]
+    for seed in range(20):
+        batch = batch_of(seed=seed)
+        noise = torch.get_rng_state()
+        fast.update(batch)
+        torch.set_rng_state(noise)
+        plain_update(plain, adams, batch)
+    assert fast.log_alpha.item() == pytest.approx(plain.log_alpha.item(), abs=1e-6)
+    for name in ("actor", "critic", "target", "test_actor"):
+        pairs = zip(
+            getattr(fast, name).parameters(), getattr(plain, name).parameters(), strict=True
+        )
+        for p, q in pairs:
+            torch.testing.assert_close(p, q, atol=2e-6, rtol=0)
+
+
 def test_the_target_critics_follow_by_tau():
     sac = small(tau=0.25)
     old = [p.clone() for p in sac.target.parameters()]
