@@ -90,10 +90,9 @@ class Coffee(TaskEnv):
         self.time = self.np_random.uniform(0, PERIOD)
         self.swing()
 
-    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict]:
+    def move(self) -> None:
         self.time += DT * SUBSTEPS
         self.swing()
-        return super().step(action)
 
     def swing(self) -> None:
         """Put the human's lamp where it is at this time."""

@@ -33,9 +33,13 @@ STROKE, STROKE_TIME = 0.174, 0.40  # m, s: the expert's hit
 class Slide(TaskEnv):
     __doc__ = __doc__
     CAMERA = ((0.71, 0.0, 0.20), 1.58)  # m: 70 cm fill the image
-    STEP, LEASH = 0.04, 0.06  # m: 1 m/s at full action
+    # m: 1 m/s at full action. Slower up and down: landing on the puck at 0.6 m/s turns the robot's
+    # wrist faster than twice its rated speed.
+    STEP, LEASH = 0.04, (0.06, 0.06, 0.025)
     # 1/s^2: at 400 the tip lags a hit by 9 cm, which hides in the goal what the puck will do
     KP = 1600.0
+    # A hit of 0.9 m/s turns the elbow at 3.0 rad/s; a real Panda, with 2.175, could not do it.
+    OVERSPEED = 2.0
     WORKSPACE = ((0.42, -0.002, 0.015), (0.64, 0.002, 0.28))
     START = (0.46, 0.0, 0.15)
     CONTACT = RADIUS + FINGER

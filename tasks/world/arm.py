@@ -4,14 +4,13 @@ In: a goal for the arm's tip, position in metres and orientation. Out: joint tor
 tip behave like a critically damped mass on springs, in all six directions alike, whatever the arm's
 pose:
     tau = J^T Lambda (kp e - kd v) + h + N^T M (posture),    Lambda = (J M^-1 J^T)^-1
-After Khatib 1987, IEEE J. Robotics and Automation 3(1), 43-53; kp and the posture are ours.
+After Khatib 1987, IEEE J. Robotics and Automation 3(1), 43-53, limit of speeds included; kp and
+the posture are ours.
 """
 
 from __future__ import annotations
 
-import shutil
 import tempfile
-import weakref
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,34 +23,46 @@ if TYPE_CHECKING:
 
 KP = 400.0  # 1/s^2, stiffness per unit of mass: the tip's natural frequency is sqrt(KP) = 20 rad/s
 FRICTION = 0.4  # of gripper and hand: rougher ones stick to a pushed object and tip it over
-KP_POSTURE = 10.0  # 1/s^2, pull towards the rest posture, in the nullspace of the tip's motion
+# Of kp: the pull towards the rest posture, in the nullspace of the tip's motion. It has to bear the
+# tip's acceleration: with 10 instead of 40 1/s^2 slide's elbow swings up when actions alternate.
+POSTURE = 1 / 40
+YIELD = 0.003  # m out of its box, where a tip gives way; in free motion it is 1.1 mm at most
+EXACT = 1e-7  # m and rad, where a reset is content; Bullet's poses are exact to 4e-8
 
 
 class Arm:
     """One arm in a PyBullet client, its tip driven by the Operational Space Controller.
 
-    `goal` is the tip's goal position in metres; the orientation goal is always straight down. kp is
-    the stiffness in 1/s^2.
+    `goal` is the tip's goal position in metres; the orientation goal is always straight down.
+    box: the corners (low, high) of the goal's box, in m. kp: the tip's stiffness in 1/s^2.
+    overspeed: how many times its rated speeds the joints may reach.
     """
 
-    def __init__(self, client: BulletClient, embodiment: str, kp: float = KP):
-        self.p, self.spec = client, ARMS[embodiment]()
+    def __init__(
+        self,
+        client: BulletClient,
+        embodiment: str,
+        box: tuple[tuple[float, ...], tuple[float, ...]],
+        kp: float = KP,
+        overspeed: float = 1.0,
+    ):
+        self.p, self.spec, self.box = client, ARMS[embodiment](), np.array(box)
         self.kp, self.kd = kp, 2 * np.sqrt(kp)  # critically damped
-        # kept while we live: the viewer reads meshes
-        files = Path(tempfile.mkdtemp(prefix="lbw_arm_"))
-        weakref.finalize(self, shutil.rmtree, files, ignore_errors=True)
-        for name, text in {"arm.urdf": self.spec.urdf, **self.spec.meshes}.items():
-            (files / name).write_text(text)
+        self.kp_posture = POSTURE * kp
         # The human's inertias are stated; the Panda file's are placeholders, Bullet's are better.
         flags = client.URDF_USE_INERTIA_FROM_FILE if embodiment == "human" else 0
-        self.body = client.loadURDF(
-            str(files / "arm.urdf"), self.spec.base, useFixedBase=True, flags=flags
-        )
+        with tempfile.TemporaryDirectory(prefix="lbw_arm_") as folder:
+            for name, text in {"arm.urdf": self.spec.urdf, **self.spec.meshes}.items():
+                Path(folder, name).write_text(text)
+            self.body = client.loadURDF(
+                str(Path(folder, "arm.urdf")), self.spec.base, useFixedBase=True, flags=flags
+            )
         infos = [client.getJointInfo(self.body, j) for j in range(client.getNumJoints(self.body))]
         self.joints = [i[0] for i in infos if i[2] == client.JOINT_REVOLUTE]  # the 7 that turn
         self.links = {i[12].decode(): i[0] for i in infos}
         self.tip = self.links[TIP[embodiment]]
         self.effort = np.array(self.spec.effort, float)
+        self.speed = overspeed * np.array(self.spec.speed)
         self.home = np.array(self.spec.home)
         self.down = np.array(self.spec.down, float)
 
@@ -103,7 +114,7 @@ class Arm:
             self._set(q)
             error = self._error(tip)
             length = np.abs(error).max()
-            if length < 1e-9:
+            if length < EXACT:
                 break
             J = self.jacobian(q)
             inverse = np.linalg.pinv(J)
@@ -136,16 +147,32 @@ class Arm:
         F = J.T @ Lambda  # (7, 6), acceleration of the tip -> joint torque
         NT_M = M - F @ J  # (7, 7) = N^T M, as M_inv_JT^T M = J
         h = np.array(self.p.calculateInverseDynamics(self.body, list(q), list(dq), self._zeros))
-        self._Kq = self.kp * F @ J + KP_POSTURE * NT_M
-        self._Kd = self.kd * F @ J + 2 * np.sqrt(KP_POSTURE) * NT_M
-        self._bias = (
-            h + self.kp * F @ (self._error(self.goal) + J @ q) + KP_POSTURE * NT_M @ self.home
-        )
+        error = self._error(self.goal)
+        # At these joint speeds damper and spring balance: a goal that asks for more comes nearer.
+        speed = self.kp / self.kd * np.abs(M_inv_JT @ (Lambda @ error))  # (7,) rad/s
+        error /= max(1.0, (speed / self.speed).max())
+        self._Kq = self.kp * F @ J + self.kp_posture * NT_M
+        self._Kd = self.kd * F @ J + 2 * np.sqrt(self.kp_posture) * NT_M
+        self._bias = h + self.kp * F @ (error + J @ q) + self.kp_posture * NT_M @ self.home
+        self._h, self._q, self._x, self._dx_dq = h, q, self.tip_pose()[0], J[:3]
 
     def actuate(self) -> None:
         """Send the torques for the next simulation step; Bullet forgets them after each."""
         q, dq = self.state()
-        tau = np.clip(self._bias - self._Kq @ q - self._Kd @ dq, -self.effort, self.effort)
+        x = self._x + self._dx_dq @ (q - self._q)
+        inside = np.clip(x, *self.box)
+        if np.abs(x - inside).max() > YIELD:
+            # Only contact drives the tip out of its box: a gripper that presses on a thing bends at
+            # its light wrist, and the tip slides along x, 1.4 times as far as it presses.
+            self.goal = inside
+            self.prepare()
+        tau = self._bias - self._Kq @ q - self._Kd @ dq
+        over = np.abs(tau) > self.effort
+        if over.any():
+            # One factor for all joints. Where each was cut by itself, the tip left its line and the
+            # elbow swung up: slide's tip was up to 63 cm out of its box, its joints at 61 rad/s.
+            drive, room = tau - self._h, np.copysign(self.effort, tau) - self._h
+            tau = self._h + max(0.0, (room[over] / drive[over]).min()) * drive
         self.p.setJointMotorControlArray(
             self.body, self.joints, self.p.TORQUE_CONTROL, forces=tau.tolist()
         )

@@ -25,6 +25,7 @@ class ArmSpec:
     home: tuple[float, ...]  # rest posture, one angle per joint
     down: tuple[tuple[float, ...], ...]  # rotation matrix of the tip when it points at the table
     effort: tuple[float, ...]  # torque limits
+    speed: tuple[float, ...]  # joint speed limits, rad/s
     reach_links: tuple[str, ...]  # links that may touch the world; the others never get near it
     colours: dict[str, tuple]  # link name -> rgba
     meshes: dict[str, str] = field(default_factory=dict)  # file name -> OBJ text, beside the URDF
@@ -50,7 +51,9 @@ def panda() -> ArmSpec:
         base=(0.0, 0.0, 0.0),
         home=(0.0, 0.10, 0.0, -2.45, 0.0, 2.55, 0.785),
         down=((1, 0, 0), (0, -1, 0), (0, 0, -1)),
-        effort=(87, 87, 87, 87, 12, 12, 12),  # panda.urdf's, which are the real arm's
+        # Both are panda.urdf's, which are the real arm's.
+        effort=(87, 87, 87, 87, 12, 12, 12),
+        speed=(2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61),
         reach_links=("panda_hand", "panda_leftfinger", "panda_rightfinger"),
         # One colour: patches of an arm in two tones tempt the translation to paint them anywhere.
         colours={f"panda_{name}": WHITE for name in parts},
@@ -167,6 +170,7 @@ def human() -> ArmSpec:
         home=(0.0, -0.60, 0.0, 1.75, 0.0, 0.42, 0.0),
         down=((0, 0, 1), (0, 1, 0), (-1, 0, 0)),
         effort=(90, 90, 60, 60, 20, 20, 20),
+        speed=(2.175, 2.175, 2.175, 2.175, 2.61, 2.61, 2.61),
         reach_links=("hand",),
         colours={n: SLEEVE for n in ("base", "upper_arm", "cuff")}
         | {n: SKIN for n in ("forearm", "wrist", "hand")},

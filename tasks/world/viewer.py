@@ -122,8 +122,13 @@ def read_mesh(path: Path | str) -> np.ndarray:
         return data[4:].reshape(-1, 50)[:, 12:48].copy().view("<f4").reshape(-1, 3, 3).astype(float)
     if path.suffix.lower() != ".obj":
         raise ValueError(f"{path.name}: the viewer reads OBJ and binary STL meshes; convert it.")
+    return read_obj(path.read_text(errors="replace"))
+
+
+def read_obj(text: str) -> np.ndarray:
+    """Triangles (F, 3, 3) of a Wavefront OBJ file's text."""
     vertices, faces = [], []
-    for line in path.read_text(errors="replace").splitlines():
+    for line in text.splitlines():
         kind, *rest = line.split() or [""]
         if kind == "v":
             vertices.append([float(x) for x in rest[:3]])
@@ -143,9 +148,11 @@ def transform(position: Vector, quaternion: Vector) -> np.ndarray:
     return T
 
 
-def drawing(kind: int, size: Sequence[float], file: str) -> list[tuple[g.Geometry, np.ndarray]]:
+def drawing(
+    kind: int, size: Sequence[float], file: str, meshes: dict[str, str]
+) -> list[tuple[g.Geometry, np.ndarray]]:
     """What draws a visual shape of `getVisualShapeData`: geometries and their 4x4 places in it."""
-    at = np.eye(4)
+    at, name = np.eye(4), Path(file).name
     if kind == p.GEOM_BOX:
         return [(g.Box([*size]), at)]  # full lengths
     if kind == p.GEOM_SPHERE:
@@ -159,7 +166,8 @@ def drawing(kind: int, size: Sequence[float], file: str) -> list[tuple[g.Geometr
         ]
         return [(g.Cylinder(size[0], size[1]), Y_TO_Z), *ends]
     if kind == p.GEOM_MESH:
-        return [(Mesh(read_mesh(file) * size), at)]
+        corners = read_obj(meshes[name]) if name in meshes else read_mesh(file)
+        return [(Mesh(corners * size), at)]
     raise ValueError(
         f"the viewer cannot draw a shape of PyBullet's type {kind}; use boxes, balls and meshes."
     )
@@ -168,11 +176,16 @@ def drawing(kind: int, size: Sequence[float], file: str) -> list[tuple[g.Geometr
 class Recorder:
     """Records the bodies of a PyBullet client for the browser: all of them, or those listed by id.
 
-    Shapes and colours are read now, poses at every `snap`. Raises ValueError for a shape it cannot
-    draw.
+    Shapes and colours are read now, poses at every `snap`. meshes: name and text of the OBJ files
+    that are gone by now. Raises ValueError for a shape it cannot draw.
     """
 
-    def __init__(self, client: int, bodies: Iterable[int] | None = None):
+    def __init__(
+        self,
+        client: int,
+        bodies: Iterable[int] | None = None,
+        meshes: dict[str, str] | None = None,
+    ):
         self.client, self.eye, self.target = client, EYE, TARGET  # m: where one looks from, and at
         self.world: World | None = (
             None  # of a task's environment, whose scenery is shown for a picture only
@@ -192,7 +205,7 @@ class Recorder:
                 if (body, link) not in self.links:
                     self.links.append((body, link))
                 row, visual = self.links.index((body, link)), transform(position, quaternion)
-                for geometry, at in drawing(kind, size, file.decode()):
+                for geometry, at in drawing(kind, size, file.decode(), meshes or {}):
                     self.shapes.append((row, geometry, visual @ at, rgba))
 
     def snap(self) -> None:
@@ -302,7 +315,7 @@ class Recorder:
 def mirror(env: TaskEnv) -> Recorder:
     """A recorder of a task's environment with its scenery: the camera's view, and the arm."""
     env.world.show_scenery(True)
-    recorder = Recorder(env.world.client)
+    recorder = Recorder(env.world.client, meshes=env.arm.spec.meshes)
     recorder.world = env.world
     env.world.show_scenery(False)
     wider = env.CAMERA[1] / TaskEnv.CAMERA[1]
