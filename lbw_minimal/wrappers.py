@@ -73,12 +73,15 @@ class KeypointRewardWrapper(gym.Wrapper, RecordConstructorArgs):
         return self._observe(), info
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict]:
-        """As Gymnasium's, paying r_t."""
+        """As Gymnasium's, paying r_t. An episode is cut, truncated, where the task ends it."""
         z, _, terminated, truncated, info = self.env.step(action)
         pair = self._recent[-1].reshape(-1, 2), z.reshape(-1, 2)  # z_t and z_{t+1}, (K, 2) each
         reward, parts = self.keypoint_reward(*pair, self._t)
         self._recent, self._t = [*self._recent[1:], z], self._t + 1
-        return self._observe(), reward, terminated, truncated, info | {"reward_parts": parts}
+        # r_t is below zero: an end of value 0 would be worth reaching, and an agent would learn to
+        # throw the object off the table. So the episode is cut there, and s' keeps its value.
+        over = terminated or truncated
+        return self._observe(), reward, False, over, info | {"reward_parts": parts}
 
     def _observe(self):
         reward, (z_2, z_1, z) = self.keypoint_reward, self._recent

@@ -150,6 +150,20 @@ def test_reward_parts_are_told_beside_the_environments_own_info(reward):
     )
 
 
+def test_an_end_of_the_task_is_no_end_worth_reaching(reward):
+    """Rewards are negative: if nothing came after it, losing the object early would pay best."""
+
+    class Lost(Film):
+        def step(self, action):
+            frame, paid, _, truncated, info = super().step(action)
+            return frame, paid, self.t == 3, truncated, info
+
+    env = wrap(Lost(demonstration()), reward)
+    env.reset(seed=0)
+    ends = [env.step(np.zeros(3, np.float32))[2:4] for _ in range(3)]
+    assert ends == [(False, False), (False, False), (False, True)]
+
+
 def test_our_agent_trains_on_it(reward):
     _, log = train(wrap(ToyPush(), reward), steps=100, seed=0, random_steps=50, width=8, batch=8)
     assert np.isfinite(log[-1]["critic_loss"]) and log[-1]["r1"] < 0
