@@ -93,10 +93,14 @@ def read(path):
 
 
 RUNS = sorted((RESULTS / "runs").glob("*/metrics.json"))
-AGAIN, HUNDRED = (sorted((RESULTS / name).glob("*.json")) for name in ("again", "hundred"))
+AGAIN, HUNDRED, LIMITS = (
+    sorted((RESULTS / name).glob("*.json")) for name in ("again", "hundred", "limits")
+)
 
 
-@pytest.mark.parametrize("path", RUNS + AGAIN + HUNDRED, ids=lambda p: str(p.relative_to(RESULTS)))
+@pytest.mark.parametrize(
+    "path", RUNS + AGAIN + HUNDRED + LIMITS, ids=lambda p: str(p.relative_to(RESULTS))
+)
 def test_shipped_run_is_of_the_present_recipe(path):
     settings = read(path)["settings"]
     recipe = import_module(f"tasks.{settings['task']}").RECIPE
@@ -119,6 +123,15 @@ def test_shipped_tables_are_those_of_the_shipped_runs(tmp_path, monkeypatch):
         assert (out / f"{name}.json").read_text() == (RESULTS / f"{name}.json").read_text()
         for part in (RESULTS / f"{name}.md").read_text().split("\n\n"):
             assert part.strip() in readme
+
+
+def test_policies_on_arms_with_limits_are_as_good_as_the_readme_says():
+    wins = {p.stem: sum(e["success"] for e in read(p)["episodes"]) for p in LIMITS}
+    assert all(len(read(path)["episodes"]) == 100 for path in LIMITS)
+    slide, again = wins.pop("slide"), wins.pop("slide-again-0")
+    readme = " ".join((ROOT / "README.md").read_text().split())
+    assert wins == dict.fromkeys(("coffee", "drawer", "push", "reach"), 100)
+    assert f"slide's in {slide} (" in readme and f"succeeds in {again} (" in readme
 
 
 def test_repeated_runs_are_as_good_as_the_readme_says():
