@@ -15,7 +15,8 @@ import pybullet_data
 import pytest
 import umsgpack
 
-from tasks.world.viewer import Recorder, normals, read_mesh, transform
+from tasks.world.meshes import normals, read_mesh
+from tasks.world.viewer import Recorder, transform
 
 PANDA = Path(pybullet_data.getDataPath()) / "franka_panda" / "panda.urdf"
 
