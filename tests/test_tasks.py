@@ -86,7 +86,7 @@ def test_the_drawer_stays_where_nobody_pushes():
     before = env.object_position()[0]
     for _ in range(25):
         env.step(np.zeros(3))
-    # Dry friction stops 0.9 kg at 0.3 m/s within m v^2 / 2 F = 2.3 mm.
+    # Dry friction stops 0.9 kg at 0.3 m/s within m v^2 / 2 F = 2.0 mm.
     assert 0 < env.object_position()[0] - before < 0.005
     env.close()
 
