@@ -196,22 +196,20 @@ def imitate(
     run: Run,
     form: str = "mended",
     without: str | None = None,
-) -> tuple[sac.SAC, gym.Env]:
+) -> tuple[sac.Policy, gym.Env]:
     """Learn a policy for `env`, a Gymnasium environment of RGB frames, from one demonstration.
 
     demo (N, 84, 84, 3) uint8: the human video. robot (M, 84, 84, 3) uint8: random robot motion.
     form: "literal" for Eq. 8-10 as written, "mended" for what `reward.py` adds; without: one of
-    `MENDS` to leave out. Returns the agent and `env` wrapped so that its observations are the
+    `MENDS` to leave out. Returns the policy and `env` wrapped so that its observations are the
     policy's.
     """
     perception.watch(demo)
     env, _ = watched(env, perception, robot, form, without)
     path = run.out / "policy.safetensors"
-    if path.exists():
-        agent = sac.load(path)
-    else:
+    if not path.exists():
         with run.stage("policy") as checkpoint:
             agent, log = sac.train(env, steps=recipe.policy_steps, seed=seed, checkpoint=checkpoint)
             run.log("policy_log", log)
             sac.save(path, agent)
-    return agent, env
+    return sac.load(path), env

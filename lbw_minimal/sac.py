@@ -20,8 +20,15 @@ import gymnasium as gym
 import numpy as np
 import torch
 
-from lbw_minimal.sac_networks import Actor, TwinCritic
-from lbw_minimal.training import Checkpoint, load_state, progress, save_state, seed_everything
+from lbw_minimal.sac_networks import Actor, Normaliser, Policy, TwinCritic
+from lbw_minimal.training import (
+    Checkpoint,
+    InputError,
+    load_state,
+    progress,
+    save_state,
+    seed_everything,
+)
 
 # aimed at, per number of an action; the published -1 is noise of 0.09, too much to dose a hit
 ENTROPY = -2.0
@@ -31,9 +38,6 @@ CANDIDATES = 4  # windows that are kept: training goes up and down
 TRIALS = 5
 # of the training: from here the learning rate falls to 0; on slide 38 of 40 for 34 without
 FALL_FROM = 0.3
-# below it is a keypoint's noise: dividing by less would blow the noise up to a signal
-MIN_OBS_STD = 0.02
-
 
 Batch = dict[str, torch.Tensor]  # transitions: obs, action, reward, next_obs, terminal
 
@@ -94,18 +98,21 @@ class SAC:
         alpha: float = 0.02,
         average: float = 0.002,
     ):
-        self.sizes = {"obs_dim": obs_dim, "action_dim": action_dim, "width": width}
         self.gamma, self.tau, self.average = gamma, tau, average
+        self.normalise = Normaliser(obs_dim)
         self.actor = Actor(obs_dim, action_dim, width)
+        self.sizes = self.actor.sizes
         self.critic = TwinCritic(obs_dim, action_dim, width)
         self.log_alpha = torch.tensor(math.log(alpha), requires_grad=True)
         self.target_entropy = ENTROPY * action_dim
         self.test_actor = deepcopy(self.actor).requires_grad_(False)
         self.target = deepcopy(self.critic).requires_grad_(False)
         # One optimizer for all: the calls, not the arithmetic, are what a small network costs.
+        self._of_critic = [*self.critic.parameters(), self.log_alpha]
+        self._of_actor = list(self.actor.parameters())
         groups = [
-            {"params": [*self.critic.parameters(), self.log_alpha], "lr": critic_lr},
-            {"params": list(self.actor.parameters()), "lr": actor_lr},
+            {"params": self._of_critic, "lr": critic_lr},
+            {"params": self._of_actor, "lr": actor_lr},
         ]
         self.optimizer = torch.optim.Adam(groups, fused=True)
         self.rates = critic_lr, actor_lr
@@ -115,8 +122,6 @@ class SAC:
         self._fast: list[list[torch.Tensor]] = [
             list(m.parameters()) for m in (self.critic, self.actor)
         ]
-        self.obs_count = 0
-        self.obs_mean, self.obs_var = torch.zeros(obs_dim), torch.ones(obs_dim)
 
     @property
     def alpha(self) -> float:
@@ -129,23 +134,10 @@ class SAC:
         for group, rate in zip(self.optimizer.param_groups, self.rates, strict=True):
             group["lr"] = share * rate
 
-    def observe(self, obs: np.ndarray) -> None:
-        """Take one observation (S,) into the running mean and variance (Welford)."""
-        self.obs_count += 1
-        delta, share = torch.as_tensor(obs) - self.obs_mean, 1 / self.obs_count
-        self.obs_mean = self.obs_mean + share * delta
-        self.obs_var = (1 - share) * (self.obs_var + share * delta.square())
-
-    def normalise(self, obs: torch.Tensor) -> torch.Tensor:
-        """Observations (..., S) with mean 0 and variance 1 over all observed so far."""
-        return ((obs - self.obs_mean) / self.obs_var.sqrt().clamp(min=MIN_OBS_STD)).clamp(-5, 5)
-
-    @torch.no_grad()
     def act(self, obs: np.ndarray, deterministic: bool = False) -> np.ndarray:
         """Action (A,) in [-1, 1] for an observation (S,): a sample, or the test actor's mean."""
-        s = self.normalise(torch.as_tensor(obs, dtype=torch.float32))
-        a = torch.tanh(self.test_actor(s)[0]) if deterministic else self.actor.sample(s)[0]
-        return a.numpy()
+        actor = self.test_actor if deterministic else self.actor
+        return Policy(actor, self.normalise).act(obs, deterministic)
 
     def critic_target(self, batch: Batch) -> torch.Tensor:
         """y (B,) = r + gamma (1 - terminal) (min_i Q'_i(s', a') - alpha log pi(a'|s')), a' ~ pi."""
@@ -162,13 +154,15 @@ class SAC:
 
         a, log_pi = self.actor.sample(s)
         alpha = self.log_alpha.exp()
-        actor_loss = (alpha.detach() * log_pi - self.critic(s, a, frozen=True).amin(0)).mean()
+        actor_loss = (alpha.detach() * log_pi - self.critic(s, a).amin(0)).mean()
         # Raises alpha while the entropy -E[log pi] is below its target.
         entropy = -log_pi.detach().mean()
         alpha_loss = alpha * (entropy - self.target_entropy)
 
+        # The actor's loss goes through the critics and must not move them: each to its own weights.
         self.optimizer.zero_grad()
-        (critic_loss + actor_loss + alpha_loss).backward()
+        (critic_loss + alpha_loss).backward(inputs=self._of_critic)
+        actor_loss.backward(inputs=self._of_actor)
         self.optimizer.step()
         for slow, fast, pace in zip(self._slow, self._fast, (self.tau, self.average), strict=True):
             torch._foreach_lerp_(slow, fast, pace)
@@ -185,14 +179,13 @@ class SAC:
         return [deepcopy(actor.state_dict()) for actor in (self.actor, self.test_actor)]
 
     def _modules(self):
-        return {
-            n: getattr(self, n) for n in ("actor", "critic", "test_actor", "target", "optimizer")
-        }
+        names = ("actor", "critic", "test_actor", "target", "normalise", "optimizer")
+        return {n: getattr(self, n) for n in names}
 
     def state_dict(self) -> dict[str, Any]:
         """All that `load_state_dict` needs to go on exactly here."""
-        rest = {n: getattr(self, n) for n in ("log_alpha", "obs_mean", "obs_var", "obs_count")}
-        return {n: m.state_dict() for n, m in self._modules().items()} | rest
+        states = {n: m.state_dict() for n, m in self._modules().items()}
+        return states | {"log_alpha": self.log_alpha}
 
     def load_state_dict(self, state: dict[str, Any]) -> None:
         """Be the agent whose `state_dict` came through a file."""
@@ -200,22 +193,28 @@ class SAC:
             m.load_state_dict(state[n])
         # in place: the optimizer holds this very tensor
         self.log_alpha.data.copy_(state["log_alpha"])
-        self.obs_mean, self.obs_var, self.obs_count = (
-            state[f"obs_{n}"] for n in ("mean", "var", "count")
-        )
 
 
-def save(path: Path | str, sac: SAC) -> None:
-    """Write the agent to one file."""
-    save_state(path, {"sizes": sac.sizes, "agent": sac.state_dict()})
+def save(path: Path | str, agent: SAC | Policy) -> None:
+    """Write what acts at test time to one file; what training takes is in its checkpoint."""
+    actor = agent.test_actor if isinstance(agent, SAC) else agent.actor
+    parts = {"actor": actor.state_dict(), "normalise": agent.normalise.state_dict()}
+    save_state(path, {"kind": "policy", "sizes": agent.sizes} | parts)
 
 
-def load(path: Path | str) -> SAC:
-    """The agent that `save` wrote. Raises InputError if the file is missing or damaged."""
+def load(path: Path | str) -> Policy:
+    """The policy that `save` wrote. Raises InputError if the file holds anything else."""
     saved = load_state(path)
-    sac = SAC(**saved["sizes"])
-    sac.load_state_dict(saved["agent"])
-    return sac
+    if "agent" in saved:  # such a file held critics and optimizer, too
+        agent = saved["agent"]
+        observed = {n: torch.as_tensor(agent[f"obs_{n}"]) for n in ("count", "mean", "var")}
+        saved |= {"kind": "policy", "actor": agent["test_actor"], "normalise": observed}
+    if saved.get("kind") != "policy":
+        raise InputError(f"{path}: not a policy; give the file that SAC's training wrote.")
+    actor, normalise = Actor(**saved["sizes"]), Normaliser(saved["sizes"]["obs_dim"])
+    actor.load_state_dict(saved["actor"])
+    normalise.load_state_dict(saved["normalise"])
+    return Policy(actor, normalise)
 
 
 def train(
@@ -251,14 +250,14 @@ def train(
     while now.step < steps:
         rows, losses, ended = [], [], False
         obs, _ = env.reset(seed=_seed(seed, len(now.log)))
-        sac.observe(obs)
+        sac.normalise.observe(obs)
         while not ended:
             random = now.step < random_steps
             action = _uniform(rng, env) if random else sac.act(obs)
             next_obs, reward, terminal, truncated, info = env.step(action)
             # `truncated` stays out: the time limit is the clock's doing, and s' keeps its value.
             buffer.add(obs=obs, action=action, reward=reward, next_obs=next_obs, terminal=terminal)
-            sac.observe(next_obs)
+            sac.normalise.observe(next_obs)
             rows.append({"reward": float(reward), **info.get("reward_parts", {})})
             obs, ended, now.step = next_obs, terminal or truncated, now.step + 1
             if now.step > random_steps:

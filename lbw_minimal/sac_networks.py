@@ -1,8 +1,8 @@
 """The networks of soft actor-critic: an actor that draws actions, and two critics in one.
 
 In: observations (B, S), brought to mean 0 and variance 1. Out: actions (B, A) in (-1, 1) with their
-log-density, and Q-values. Not in the publication: LayerNorm in the critics, which keeps Q from
-running away when steps are few.
+log-density, and Q-values. Not in the publication: running normalisation of observations, and
+LayerNorm in the critics, which keeps Q from running away when steps are few.
 """
 
 from __future__ import annotations
@@ -10,12 +10,39 @@ from __future__ import annotations
 import math
 from itertools import pairwise
 
+import numpy as np
 import torch
 import torch.nn.functional as F
 from torch import nn
 
+# Below it is a keypoint's noise: dividing by less would blow the noise up to a signal.
+MIN_OBS_STD = 0.02
 # exp(-5) acts as good as deterministic; exp(2) is past tanh's ends.
 LOG_STD_MIN, LOG_STD_MAX = -5.0, 2.0
+
+
+class Normaliser(nn.Module):
+    """Observations (..., S) with mean 0 and variance 1 over all that were observed."""
+
+    count: torch.Tensor
+    mean: torch.Tensor
+    var: torch.Tensor
+
+    def __init__(self, obs_dim: int):
+        super().__init__()
+        self.register_buffer("count", torch.tensor(0))
+        self.register_buffer("mean", torch.zeros(obs_dim))
+        self.register_buffer("var", torch.ones(obs_dim))
+
+    def observe(self, obs: np.ndarray) -> None:
+        """Take one observation (S,) into the running mean and variance (Welford)."""
+        self.count += 1
+        delta, share = torch.as_tensor(obs) - self.mean, 1 / int(self.count)
+        self.mean = self.mean + share * delta
+        self.var = (1 - share) * (self.var + share * delta.square())
+
+    def forward(self, obs: torch.Tensor) -> torch.Tensor:
+        return ((obs - self.mean) / self.var.sqrt().clamp(min=MIN_OBS_STD)).clamp(-5, 5)
 
 
 class Actor(nn.Module):
@@ -23,6 +50,7 @@ class Actor(nn.Module):
 
     def __init__(self, obs_dim: int, action_dim: int, width: int):
         super().__init__()
+        self.sizes = {"obs_dim": obs_dim, "action_dim": action_dim, "width": width}
         self.net = nn.Sequential(
             *(nn.Linear(obs_dim, width), nn.ReLU()),
             *(nn.Linear(width, width), nn.ReLU()),
@@ -47,6 +75,20 @@ class Actor(nn.Module):
         return torch.tanh(u), (log_normal - log_slope).sum(-1)
 
 
+class Policy:
+    """All that acting takes: an actor, and what brings observations to the size it knows."""
+
+    def __init__(self, actor: Actor, normalise: Normaliser):
+        self.actor, self.normalise, self.sizes = actor, normalise, actor.sizes
+
+    @torch.no_grad()
+    def act(self, obs: np.ndarray, deterministic: bool = False) -> np.ndarray:
+        """Action (A,) float32 in [-1, 1] for an observation (S,): a sample, or the mean."""
+        s = self.normalise(torch.as_tensor(obs, dtype=torch.float32))
+        a = torch.tanh(self.actor(s)[0]) if deterministic else self.actor.sample(s)[0]
+        return a.numpy()
+
+
 class TwinCritic(nn.Module):
     """Two independent Q(s, a) as one batched network: half the calls of two modules."""
 
@@ -59,9 +101,9 @@ class TwinCritic(nn.Module):
             self.weights.append(torch.empty(2, n_in, n_out).uniform_(-bound, bound))
             self.biases.append(torch.empty(2, 1, n_out).uniform_(-bound, bound))
 
-    def forward(self, s: torch.Tensor, a: torch.Tensor, frozen: bool = False) -> torch.Tensor:
-        """Q_1 and Q_2 (2, B) of s (B, S), a (B, A); `frozen` lets gradients pass to `a` alone."""
-        W, b = ([p.detach() if frozen else p for p in ps] for ps in (self.weights, self.biases))
+    def forward(self, s: torch.Tensor, a: torch.Tensor) -> torch.Tensor:
+        """Q_1 and Q_2 (2, B) of s (B, S) and a (B, A)."""
+        W, b = self.weights, self.biases
         x = torch.cat([s, a], -1).expand(2, -1, -1)  # (2, B, S + A)
         for i in range(2):
             # The bias goes in before LayerNorm, which forgets scale: Q(s, a) would equal Q(2s, 2a).

@@ -9,7 +9,7 @@ import torch
 
 from lbw_minimal import sac as module
 from lbw_minimal.sac import SAC, Actor, ReplayBuffer, TwinCritic, best_actor, train
-from lbw_minimal.training import Checkpoint
+from lbw_minimal.training import Checkpoint, InputError, save_state
 
 
 class Walk(gym.Env):
@@ -150,10 +150,54 @@ def test_alpha_rises_when_entropy_is_below_its_target():
 
 def test_the_actors_loss_does_not_train_the_critics():
     sac, batch = small(), batch_of()
-    s = sac.normalise(batch["obs"])
-    sac.critic(s, sac.actor.sample(s)[0], frozen=True).sum().backward()
-    assert all(p.grad is None for p in sac.critic.parameters())
-    assert any(p.grad.abs().sum() > 0 for p in sac.actor.parameters())
+    y = sac.critic_target(batch)
+    sac.critic_target = lambda batch: y
+    loss = (sac.critic(sac.normalise(batch["obs"]), batch["action"]) - y).square().mean(1).sum()
+    alone = torch.autograd.grad(loss, list(sac.critic.parameters()))
+    sac.update(batch)
+    for p, gradient in zip(sac.critic.parameters(), alone, strict=True):
+        assert torch.allclose(p.grad, gradient, atol=1e-6)
+
+
+def descend(optimizer, loss):
+    optimizer.zero_grad()
+    loss.backward()
+    optimizer.step()
+
+
+def plain_update(agent, optimizers, batch):
+    """`SAC.update` as the publication writes it, an optimizer for each of the three losses."""
+    s, y = agent.normalise(batch["obs"]), agent.critic_target(batch)
+    q = agent.critic(s, batch["action"])
+    a, log_pi = agent.actor.sample(s)
+    alpha = agent.log_alpha.exp()
+    of_actor, of_critics, of_alpha = optimizers
+    entropy = -log_pi.detach().mean()
+    descend(of_actor, (alpha.detach() * log_pi - agent.critic(s, a).min(0).values).mean())
+    descend(of_critics, ((q[0] - y) ** 2).mean() + ((q[1] - y) ** 2).mean())
+    descend(of_alpha, alpha * (entropy - agent.target_entropy))
+    followers = (agent.target, agent.critic, agent.tau), (agent.test_actor, agent.actor, 0.005)
+    for slow, fast, pace in followers:
+        for p, q in zip(slow.parameters(), fast.parameters(), strict=True):
+            p.data += pace * (q.data - p.data)
+
+
+def test_one_optimizer_does_what_three_do():
+    fast, plain = (SAC(3, 2, width=16, average=0.005) for _ in range(2))
+    plain.load_state_dict(fast.state_dict())
+    parts = plain.actor.parameters(), plain.critic.parameters(), [plain.log_alpha]
+    optimizers = [torch.optim.Adam(part, 1e-3) for part in parts]
+    for seed in range(5):
+        torch.manual_seed(seed)
+        fast.update(batch_of(seed=seed))
+        torch.manual_seed(seed)
+        plain_update(plain, optimizers, batch_of(seed=seed))
+    assert plain.alpha == pytest.approx(fast.alpha, rel=1e-6)
+    for name in ("actor", "critic", "target", "test_actor"):
+        pairs = zip(
+            getattr(fast, name).parameters(), getattr(plain, name).parameters(), strict=True
+        )
+        assert all(torch.allclose(p, q, rtol=0, atol=1e-6) for p, q in pairs)
 
 
 def plain_update(agent, adams, batch):
@@ -218,9 +262,9 @@ def test_running_normalisation_is_that_of_all_observations():
         np.random.default_rng(0).normal([1, -2, 5], [1, 3, 0.5], (500, 3)).astype(np.float32),
     )
     for row in x:
-        sac.observe(row)
-    assert sac.obs_mean.numpy() == pytest.approx(x.mean(0), abs=1e-3)
-    assert sac.obs_var.numpy() == pytest.approx(x.var(0), rel=1e-3)
+        sac.normalise.observe(row)
+    assert sac.normalise.mean.numpy() == pytest.approx(x.mean(0), abs=1e-3)
+    assert sac.normalise.var.numpy() == pytest.approx(x.var(0), rel=1e-3)
 
 
 # The loop -----------------------------------------------------------------------------------------
@@ -262,13 +306,44 @@ def test_a_resumed_run_ends_as_the_uninterrupted_one(tmp_path):
         assert torch.equal(p, q)
 
 
-def test_a_saved_agent_acts_as_before(tmp_path):
+def trained():
     sac, obs = small(), np.array([0.1, -0.2, 0.3], np.float32)
-    sac.observe(obs)
+    for shift in range(3):
+        sac.normalise.observe(obs + shift)
     sac.update(batch_of())
-    module.save(tmp_path / "agent.safetensors", sac)
-    loaded = module.load(tmp_path / "agent.safetensors")
+    return sac, obs
+
+
+def test_a_saved_policy_acts_as_before(tmp_path):
+    sac, obs = trained()
+    module.save(tmp_path / "policy.safetensors", sac)
+    loaded = module.load(tmp_path / "policy.safetensors")
     assert (loaded.act(obs, deterministic=True) == sac.act(obs, deterministic=True)).all()
+    module.save(tmp_path / "again.safetensors", loaded)
+    first, second = (tmp_path / f"{name}.safetensors" for name in ("policy", "again"))
+    assert first.read_bytes() == second.read_bytes()
+
+
+def test_a_policy_file_holds_what_acts_and_nothing_else(tmp_path):
+    """41 inputs, 128 wide: 23 thousand numbers of four bytes."""
+    module.save(tmp_path / "policy.safetensors", SAC(41, 3, width=128))
+    assert (tmp_path / "policy.safetensors").stat().st_size < 100_000
+
+
+def test_a_file_of_the_whole_training_still_acts(tmp_path):
+    """What was saved before policies had files of their own."""
+    sac, obs = trained()
+    state, seen = sac.state_dict(), sac.normalise
+    observed = {"obs_mean": seen.mean, "obs_var": seen.var, "obs_count": int(seen.count)}
+    save_state(tmp_path / "old.safetensors", {"sizes": sac.sizes, "agent": state | observed})
+    loaded = module.load(tmp_path / "old.safetensors")
+    assert (loaded.act(obs, deterministic=True) == sac.act(obs, deterministic=True)).all()
+
+
+def test_a_file_of_something_else_is_refused_by_name(tmp_path):
+    save_state(tmp_path / "keypoints.safetensors", {"kind": "transporter", "K": 5})
+    with pytest.raises(InputError, match=r"keypoints\.safetensors: not a policy"):
+        module.load(tmp_path / "keypoints.safetensors")
 
 
 def test_success_is_logged_and_teaches_nothing():

@@ -107,7 +107,7 @@ def iframe(name: str, arm: str) -> str:
     return f'<iframe loading="lazy" title="{name}, {arm}" src="{name}-{arm}.html"></iframe>'
 
 
-def rollout(env: gym.Env, agent: sac.SAC, path: Path) -> tuple[np.ndarray, np.ndarray, bool]:
+def rollout(env: gym.Env, agent: sac.Policy, path: Path) -> tuple[np.ndarray, np.ndarray, bool]:
     """Frames, keypoints and success of an episode of the policy, whose scene goes to a file."""
     obs, _ = env.reset(seed=SEED)
     base, K = cast(TaskEnv, env.unwrapped), env.get_wrapper_attr("keypoint_reward").z_E.shape[1]

@@ -68,7 +68,7 @@ def perceive(job: Job) -> tuple[Perception, np.ndarray]:
     return perception, robot
 
 
-def learn(job: Job, perception: Perception, robot: np.ndarray) -> tuple[sac.SAC, gym.Env]:
+def learn(job: Job, perception: Perception, robot: np.ndarray) -> tuple[sac.Policy, gym.Env]:
     """The policy, trained or replayed, and its environment."""
     torch.set_num_threads(1)  # SAC's networks are small: a second thread costs more than it brings
     if job.args.evaluate:
@@ -84,7 +84,7 @@ def learn(job: Job, perception: Perception, robot: np.ndarray) -> tuple[sac.SAC,
     return agent, env
 
 
-def test(job: Job, agent: sac.SAC, env: gym.Env) -> tuple[dict[str, Any], str]:
+def test(job: Job, agent: sac.Policy, env: gym.Env) -> tuple[dict[str, Any], str]:
     """Play the test episodes, note their results, and return the first one's film and scene."""
     n = job.args.episodes or (2 if job.args.fast else TEST_EPISODES)
     episodes, first, scene = evaluate(agent, env, n)
@@ -98,7 +98,7 @@ def test(job: Job, agent: sac.SAC, env: gym.Env) -> tuple[dict[str, Any], str]:
     return first, scene
 
 
-def evaluate(agent: sac.SAC, env: gym.Env, n: int) -> tuple[list[dict], dict[str, Any], str]:
+def evaluate(agent: sac.Policy, env: gym.Env, n: int) -> tuple[list[dict], dict[str, Any], str]:
     """n test episodes of the policy without noise: a row each, and the first one's film and scene.
 
     Success is the paper's: the task is complete at some step. An episode is as long as in training,
