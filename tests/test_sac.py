@@ -176,14 +176,17 @@ def plain_update(agent, optimizers, batch):
     descend(of_actor, (alpha.detach() * log_pi - agent.critic(s, a).min(0).values).mean())
     descend(of_critics, ((q[0] - y) ** 2).mean() + ((q[1] - y) ** 2).mean())
     descend(of_alpha, alpha * (entropy - agent.target_entropy))
-    followers = (agent.target, agent.critic, agent.tau), (agent.test_actor, agent.actor, 0.005)
+    followers = (
+        (agent.target, agent.critic, agent.tau),
+        (agent.test_actor, agent.actor, agent.average),
+    )
     for slow, fast, pace in followers:
         for p, q in zip(slow.parameters(), fast.parameters(), strict=True):
             p.data += pace * (q.data - p.data)
 
 
 def test_one_optimizer_does_what_three_do():
-    fast, plain = (SAC(3, 2, width=16, average=0.005) for _ in range(2))
+    fast, plain = (SAC(3, 2, width=16, tau=0.02, average=0.1) for _ in range(2))
     plain.load_state_dict(fast.state_dict())
     parts = plain.actor.parameters(), plain.critic.parameters(), [plain.log_alpha]
     optimizers = [torch.optim.Adam(part, 1e-3) for part in parts]
