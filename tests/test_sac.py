@@ -159,52 +159,8 @@ def test_the_actors_loss_does_not_train_the_critics():
         assert torch.allclose(p.grad, gradient, atol=1e-6)
 
 
-def descend(optimizer, loss):
-    optimizer.zero_grad()
-    loss.backward()
-    optimizer.step()
-
-
-def plain_update(agent, optimizers, batch):
-    """`SAC.update` as the publication writes it, an optimizer for each of the three losses."""
-    s, y = agent.normalise(batch["obs"]), agent.critic_target(batch)
-    q = agent.critic(s, batch["action"])
-    a, log_pi = agent.actor.sample(s)
-    alpha = agent.log_alpha.exp()
-    of_actor, of_critics, of_alpha = optimizers
-    entropy = -log_pi.detach().mean()
-    descend(of_actor, (alpha.detach() * log_pi - agent.critic(s, a).min(0).values).mean())
-    descend(of_critics, ((q[0] - y) ** 2).mean() + ((q[1] - y) ** 2).mean())
-    descend(of_alpha, alpha * (entropy - agent.target_entropy))
-    followers = (
-        (agent.target, agent.critic, agent.tau),
-        (agent.test_actor, agent.actor, agent.average),
-    )
-    for slow, fast, pace in followers:
-        for p, q in zip(slow.parameters(), fast.parameters(), strict=True):
-            p.data += pace * (q.data - p.data)
-
-
-def test_one_optimizer_does_what_three_do():
-    fast, plain = (SAC(3, 2, width=16, tau=0.02, average=0.1) for _ in range(2))
-    plain.load_state_dict(fast.state_dict())
-    parts = plain.actor.parameters(), plain.critic.parameters(), [plain.log_alpha]
-    optimizers = [torch.optim.Adam(part, 1e-3) for part in parts]
-    for seed in range(5):
-        torch.manual_seed(seed)
-        fast.update(batch_of(seed=seed))
-        torch.manual_seed(seed)
-        plain_update(plain, optimizers, batch_of(seed=seed))
-    assert plain.alpha == pytest.approx(fast.alpha, rel=1e-6)
-    for name in ("actor", "critic", "target", "test_actor"):
-        pairs = zip(
-            getattr(fast, name).parameters(), getattr(plain, name).parameters(), strict=True
-        )
-        assert all(torch.allclose(p, q, rtol=0, atol=1e-6) for p, q in pairs)
-
-
 def plain_update(agent, adams, batch):
-    """Notebook 2's: a loss, a gradient and an optimizer for each part, and no `frozen`."""
+    """Notebook 2's: a loss, a gradient and an optimizer for each part."""
     s, y = agent.normalise(batch["obs"]), agent.critic_target(batch)
     critic_loss = (agent.critic(s, batch["action"]) - y).square().mean(1).sum()
     a, log_pi = agent.actor.sample(s)
