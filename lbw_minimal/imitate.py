@@ -25,8 +25,8 @@ from lbw_minimal.reward import KeypointReward, LiteralReward, MendedReward
 from lbw_minimal.training import Checkpoint, InputError, write_atomic
 from lbw_minimal.wrappers import KeypointObservation, KeypointRewardWrapper
 
-# Frames of random robot motion that show its pace. They are so few that they can be filmed again in
-# seconds, which gives a trained policy the very reward it was trained on.
+# Frames of random robot motion that show its pace. So few take seconds to film anew, and a trained
+# policy gets the very reward it was trained on.
 PACE = 400
 
 
@@ -36,11 +36,13 @@ class Recipe:
 
     human_frames: int  # frames the translation sees: the demonstration and random motion (Table I)
     robot_frames: int  # frames of random robot motion (Table I)
-    munit_iterations: int = 1200
-    munit_width: int = 20  # channels of the first layer
+    munit_iterations: int = 900
+    munit_width: int = 16  # channels of the first layer
     transporter_iterations: int = 600
     K: int = 5  # keypoints
-    policy_steps: int = 5_000  # environment steps of SAC
+    shift: int = 0  # pixels by which the detector's training moves frames
+    hue: int = 0  # degrees by which it turns hues
+    policy_steps: int = 2_500  # environment steps of SAC
 
 
 @dataclass
@@ -138,6 +140,7 @@ def learn_perception(
             v = [munit.translate(T, x, style) for x in (demo, random) if len(x)]
             Psi, log = transporter.train(
                 [*v, robot], iterations=recipe.transporter_iterations, K=recipe.K,
+                shift=recipe.shift, hue=recipe.hue,
                 seed=seed, device=device, checkpoint=checkpoint,
             )  # fmt: skip
             run.log("keypoints_log", log)

@@ -23,7 +23,7 @@ LEAST_STEP = 0.1  # of the robot's median step: what moves less between two fram
 # Frames of a rest that stay, 0.2 s. Movements start and end slowly. Without these frames the robot
 # is always late, and it hits a sliding puck too hard in order to catch up.
 REST = 5
-MOST_OF_HORIZON = 0.7  # the demonstration's share of an episode; the rest is for reaching the goal
+MOST_OF_HORIZON = 0.8  # the demonstration's share of an episode; the rest is for reaching the goal
 MENDS = ("trim", "speed", "include_goal", "timed")  # the switches of `MendedReward`
 
 Parts = dict[str, float]  # {"r1": ..., "r2": ...}
@@ -58,7 +58,7 @@ class MendedReward:
     (lambda_r1, lambda_r2).
 
     The mends: `trim` cuts pauses, which make idling look like the skill. `speed` slows the
-    demonstration down to the robot's pace, and hurries it if it would take more than 70 % of the
+    demonstration down to the robot's pace, and hurries it if it would take more than 80 % of the
     horizon. `include_goal` lets p reach N. `timed` compares with frame t + 1 and step t instead of
     the nearest ones, so that falling behind costs. Three changes have no switch. r1 judges z_{t+1},
     which a_t can still change, where Eq. 9 judges z_t. The distance is the mean over keypoints,

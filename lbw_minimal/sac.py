@@ -3,9 +3,10 @@ paper.
 
 In: a Gymnasium environment with vector observations and actions in [-1, 1]. Out: a policy and a log
 with a row an episode. Not in the publication: LayerNorm in the critics (keeps Q from running away
-when steps are few), running normalisation of observations, four updates a step, a lower target
-entropy, a learning rate that falls towards the end, an averaged copy of the actor, and a last round
-without noise in which raw and averaged actors of the best episodes compete for acting at test time.
+when steps are few), running normalisation of observations, returns over five steps, two updates a
+step, a lower target entropy, a learning rate that falls towards the end, an averaged copy of the
+actor, and a last round without noise in which the averaged actors of the best episodes compete for
+acting at test time.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ import gymnasium as gym
 import numpy as np
 import torch
 
+from lbw_minimal.replay import Batch, ReplayBuffer
 from lbw_minimal.sac_networks import Actor, Normaliser, Policy, TwinCritic
 from lbw_minimal.training import (
     Checkpoint,
@@ -30,59 +32,22 @@ from lbw_minimal.training import (
     seed_everything,
 )
 
-# aimed at, per number of an action; the published -1 is noise of 0.09, too much to dose a hit
-ENTROPY = -2.0
-WINDOW = 10  # episodes whose mean return makes the actors at their end candidates
-CANDIDATES = 4  # windows that are kept: training goes up and down
-# episodes without noise for each candidate; with noise an actor may dose a hit, without overshoot
+# aimed at, per number of an action; the published -1 is noise of 0.09, too much for a hit
+ENTROPY = -3.5
+WINDOW = 10  # episodes whose mean return makes the averaged actor at their end a candidate
+CANDIDATES = 3  # windows that are kept: training goes up and down
+# episodes without noise for each candidate; with noise an actor may hit right, without too hard
 TRIALS = 5
 # of the training: from here the learning rate falls to 0; on slide 38 of 40 for 34 without
 FALL_FROM = 0.3
-
-Batch = dict[str, torch.Tensor]  # transitions: obs, action, reward, next_obs, terminal
-
-
-class ReplayBuffer:
-    """The last `capacity` transitions in arrays; `terminal` is 1 where the task itself ended."""
-
-    def __init__(self, obs_dim: int, action_dim: int, capacity: int):
-        shapes: dict[str, tuple[int, ...]] = {"obs": (obs_dim,), "action": (action_dim,)}
-        shapes |= {"next_obs": (obs_dim,), "reward": (), "terminal": ()}
-        self.data = {k: np.zeros((capacity, *s), np.float32) for k, s in shapes.items()}
-        self.capacity, self.added = capacity, 0
-
-    def __len__(self) -> int:
-        return min(self.added, self.capacity)
-
-    def add(self, **transition: Any) -> None:
-        """Keep a transition: obs, action, reward, next_obs, terminal."""
-        for k, v in self.data.items():
-            v[self.added % self.capacity] = transition[k]
-        self.added += 1
-
-    def sample(self, rng: np.random.Generator, batch: int) -> Batch:
-        """`batch` of the transitions, drawn with replacement."""
-        i = rng.integers(len(self), size=batch)
-        return {k: torch.from_numpy(v[i]) for k, v in self.data.items()}
-
-    def state_dict(self) -> dict[str, Any]:
-        """The transitions, and how many there have been."""
-        return {"added": self.added, "data": {k: v[: len(self)] for k, v in self.data.items()}}
-
-    def load_state_dict(self, state: dict[str, Any]) -> None:
-        """Hold what the buffer held whose `state_dict` came through a checkpoint."""
-        self.added = state["added"]
-        for k, v in state["data"].items():
-            self.data[k][: len(self)] = v.numpy()
 
 
 class SAC:
     """Actor, twin critics and temperature with their optimizers.
 
-    obs_dim, action_dim: sizes of the vectors; actions are in [-1, 1]. gamma: discount; 0.95 looks
-    20 steps ahead, enough for a reward that is paid at every step. tau: pace of the target critics.
-    alpha: first temperature, for rewards of about 1 a step. average: pace of `test_actor`, the
-    actor's mean over some 500 updates, until `train` puts the best one there.
+    obs_dim, action_dim: sizes of the vectors; actions are in [-1, 1]. tau: pace of the target
+    critics. alpha: first temperature, for rewards of about 1 a step. average: pace of `test_actor`,
+    the actor's mean over some 200 updates, until `train` puts the best one there.
     """
 
     def __init__(
@@ -91,14 +56,13 @@ class SAC:
         action_dim: int,
         *,
         width: int = 128,
-        gamma: float = 0.95,
-        tau: float = 0.005,
+        tau: float = 0.01,
         critic_lr: float = 1e-3,
         actor_lr: float = 1e-3,
         alpha: float = 0.02,
-        average: float = 0.002,
+        average: float = 0.005,
     ):
-        self.gamma, self.tau, self.average = gamma, tau, average
+        self.tau, self.average = tau, average
         self.normalise = Normaliser(obs_dim)
         self.actor = Actor(obs_dim, action_dim, width)
         self.sizes = self.actor.sizes
@@ -140,12 +104,12 @@ class SAC:
         return Policy(actor, self.normalise).act(obs, deterministic)
 
     def critic_target(self, batch: Batch) -> torch.Tensor:
-        """y (B,) = r + gamma (1 - terminal) (min_i Q'_i(s', a') - alpha log pi(a'|s')), a' ~ pi."""
+        """y (B,) = R + discount (min_i Q'_i(s', a') - alpha log pi(a'|s')), a' ~ pi (`replay`)."""
         with torch.no_grad():
             s_next = self.normalise(batch["next_obs"])
             a_next, log_pi = self.actor.sample(s_next)
             value = self.target(s_next, a_next).amin(0) - self.log_alpha.exp() * log_pi
-            return batch["reward"] + self.gamma * (1 - batch["terminal"]) * value
+            return batch["reward"] + batch["discount"] * value
 
     def update(self, batch: Batch) -> dict[str, float]:
         """One gradient step of critics, actor and temperature; returns what the log is told."""
@@ -173,10 +137,6 @@ class SAC:
             "alpha": self.alpha,
             "entropy": entropy.item(),
         }
-
-    def actors(self) -> list[dict]:
-        """Copies of the raw and the averaged actor's state."""
-        return [deepcopy(actor.state_dict()) for actor in (self.actor, self.test_actor)]
 
     def _modules(self):
         names = ("actor", "critic", "test_actor", "target", "normalise", "optimizer")
@@ -225,7 +185,9 @@ def train(
     checkpoint: Checkpoint | None = None,
     evaluate: Callable[[SAC], dict[str, float]] | None = None,
     evaluate_every: int = 10,
-    updates: int = 4,
+    updates: int = 2,
+    n: int = 5,
+    gamma: float = 0.95,
     random_steps: int = 500,
     batch: int = 128,
     **recipe: Any,
@@ -234,16 +196,18 @@ def train(
 
     env: observations (S,) float32, actions (A,) in [-1, 1]. Its `info["reward_parts"]` and
     `info["is_success"]`, that of an episode's last step, go to the log and nowhere else. updates:
-    gradient steps an environment step, after `random_steps` uniformly random ones. evaluate(sac)
-    joins the log every `evaluate_every` episodes. recipe: arguments of `SAC`. Returns the agent and
-    the log, a row an episode. A resumed run does what the killed one would have done: each episode
-    starts from (seed, episode), and checkpoints are taken between episodes. The agent's test-time
-    actor is chosen at the end, by return: see `best_actor`.
+    gradient steps an environment step, after `random_steps` uniformly random ones. n: steps that a
+    return sums up before the critics go on. gamma: discount; 0.95 looks 20 steps ahead, enough for
+    a reward that is paid at every step. evaluate(sac) joins the log every `evaluate_every`
+    episodes. recipe: arguments of `SAC`. Returns the agent and the log, a row an episode. A resumed
+    run does what the killed one would have done: each episode starts from (seed, episode), and
+    checkpoints are taken between episodes. The agent's test-time actor is chosen at the end, by
+    return: see `best_actor`.
     """
     checkpoint, rng = checkpoint or Checkpoint(None), seed_everything(seed)
     sac = SAC(_length(env.observation_space), _length(env.action_space), **recipe)
-    # A short run can keep all it has seen.
-    buffer = ReplayBuffer(sac.sizes["obs_dim"], sac.sizes["action_dim"], steps + 1000)
+    sizes = sac.sizes["obs_dim"], sac.sizes["action_dim"]
+    buffer = ReplayBuffer(*sizes, steps + 1000, n, gamma)  # a short run can keep all it has seen
     stateful = {"sac": sac, "buffer": buffer, "rng": rng}
     now, state = checkpoint.resume(stateful, step=0, log=[], candidates=[])
     bar = progress(steps, "policy", now.step)
@@ -255,12 +219,12 @@ def train(
             random = now.step < random_steps
             action = _uniform(rng, env) if random else sac.act(obs)
             next_obs, reward, terminal, truncated, info = env.step(action)
-            # `truncated` stays out: the time limit is the clock's doing, and s' keeps its value.
-            buffer.add(obs=obs, action=action, reward=reward, next_obs=next_obs, terminal=terminal)
+            buffer.add(obs=obs, action=action, reward=float(reward), next_obs=next_obs,
+                       terminal=terminal, truncated=truncated)  # fmt: skip
             sac.normalise.observe(next_obs)
             rows.append({"reward": float(reward), **info.get("reward_parts", {})})
             obs, ended, now.step = next_obs, terminal or truncated, now.step + 1
-            if now.step > random_steps:
+            if now.step > max(random_steps, n):
                 sac.slow_down(now.step / steps)
                 losses += [sac.update(buffer.sample(rng, batch)) for _ in range(updates)]
         now.log.append(_row(len(now.log), now.step, rows, losses, info))
@@ -273,7 +237,7 @@ def train(
         checkpoint.save(state)
     bar.close()
     checkpoint.save(state, force=True)
-    actors = [actor for c in now.candidates for actor in c["actors"]] + sac.actors()
+    actors = [c["actor"] for c in now.candidates] + [deepcopy(sac.test_actor.state_dict())]
     sac.test_actor.load_state_dict(best_actor(env, sac, actors, seed))
     return sac, now.log
 
@@ -303,9 +267,9 @@ def _row(episode, step, rows, losses, info):
 
 
 def _best(candidates, log, sac):
-    """The candidates with the highest mean return, the present actors among them."""
+    """The candidates with the highest mean return, the present averaged actor among them."""
     mean = float(np.mean([r["return"] for r in log[-WINDOW:]]))
-    candidates = [*candidates, {"return": mean, "actors": sac.actors()}]
+    candidates = [*candidates, {"return": mean, "actor": deepcopy(sac.test_actor.state_dict())}]
     return sorted(candidates, key=lambda c: -c["return"])[:CANDIDATES]
 
 

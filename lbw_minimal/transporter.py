@@ -18,6 +18,7 @@ import torch
 import torch.nn.functional as F
 from torch import nn
 
+from lbw_minimal.augment import degraded, recoloured, shifted
 from lbw_minimal.images import median_frame, motion_weight, to_images
 from lbw_minimal.training import (
     Checkpoint,
@@ -158,28 +159,17 @@ class Transporter(nn.Module):
         y: torch.Tensor,
         y_seen: torch.Tensor | None = None,
         sigma: float = SIGMA,
+        moved: torch.Tensor | float = 0.0,
     ) -> tuple[torch.Tensor, torch.Tensor]:
         """y rebuilt from x, (B, 3, 84, 84), and y's keypoints (B, K, 2).
 
-        The detector looks at `y_seen` in place of y, if it is given.
+        The detector looks at `y_seen` in place of y, if it is given, which shows everything `moved`
+        (B, 1, 2) in units of z.
         """
         with torch.no_grad():  # `transport` would stop the gradient anyway; this saves its cost
             phi_x, h_x = self.phi(x), heat_map(self.keypoints(x), sigma)
-        z_y = self.keypoints(y if y_seen is None else y_seen)
+        z_y = self.keypoints(y if y_seen is None else y_seen) - moved
         return self.refiner(transport(phi_x, self.phi(y), h_x, heat_map(z_y, sigma))), z_y
-
-
-def _augment(y):
-    """y as a poor camera or an imperfect translation would show it. Nothing moves, so z must stay.
-
-    Drawn on the CPU, whose random state is in the checkpoint.
-    """
-    b = len(y)
-    gain, bias = 1 + 0.15 * torch.randn(b, 3, 1, 1), 0.1 * torch.randn(b, 3, 1, 1)
-    noise = 0.1 * torch.rand(b, 1, 1, 1) * torch.randn(y.shape)
-    blurred = torch.rand(b, 1, 1, 1).to(y.device) < 0.5
-    seen = y * gain.to(y.device) + (bias + noise).to(y.device)
-    return torch.where(blurred, F.avg_pool2d(seen, 3, 1, 1), seen)
 
 
 def _draw_pairs(lengths, n, rng):
@@ -195,10 +185,12 @@ def _draw_pairs(lengths, n, rng):
     return np.where(rng.random(n) < FREE_SHARE, rng.integers(ends[-1], size=n), x), y
 
 
-def _update(model, optimizer, x, y, median, early) -> dict:
+def _update(model, optimizer, x, y, median, early, shift, hue) -> dict:
     """One step on images x, y (B, 3, 84, 84), and its row of the log; `early` falls from 1 to 0."""
     sigma = SIGMA + (SIGMA_START - SIGMA) * early
-    y_hat, z_y = model(x, y, _augment(y), sigma)
+    seen, moved = shifted(y, shift) if shift else (y, 0.0)
+    seen = degraded(recoloured(seen, hue) if hue else seen)
+    y_hat, z_y = model(x, y, seen, sigma, moved)
     error = loss(y_hat, y, motion_weight(y, median, MOTION))
     apart = CROWDING_WEIGHT * early * crowding(z_y, sigma)
     same = IDENTITY_WEIGHT * (1 - early) * identity(z_y, y)
@@ -215,13 +207,17 @@ def train(
     iterations: int,
     seed: int,
     K: int = 5,
+    shift: int = 0,
+    hue: int = 0,
     device: str = "cpu",
     checkpoint: Checkpoint | None = None,
 ) -> tuple[Transporter, list[dict]]:
     """Fit a Transporter on videos (T, 84, 84, 3) uint8: the translated ones and the robot's.
 
     Robot frames are targets too, so the detector learns on what it later runs on; the paper names
-    only translated targets. Returns the model and a log: step, loss, and each keypoint's standard
+    only translated targets. shift, hue: the detector sees its frames moved by up to so many pixels,
+    half of them with hues turned by up to so many degrees; solutions/results/README.md says what
+    that is worth. Returns the model and a log: step, loss, and each keypoint's standard
     deviation (near 0: glued to the background). Raises InputError for frames of another shape or
     type.
     """
@@ -246,7 +242,8 @@ def train(
         warm_up = min(1.0, (now.step + 1) / 20)
         optimizer.param_groups[0]["lr"] = LEARNING_RATE * warm_up * (1 + np.cos(np.pi * done)) / 2
         x, y = (to_images(frames[i], to) for i in _draw_pairs(lengths, BATCH, rng))
-        row = _update(model, optimizer, x, y, median, early=max(0.0, 1 - 2 * done))
+        row = _update(model, optimizer, x, y, median, early=max(0.0, 1 - 2 * done),
+                      shift=shift, hue=hue)  # fmt: skip
         now.step += 1
         bar.update()
         if now.step % LOG_EVERY == 0 or now.step == iterations:

@@ -73,11 +73,11 @@ class Slide(TaskEnv):
         return [
             Leg(behind, 0.6),
             Leg(behind, 0.2),  # the tip lags its goal by 2 / 40 s
-            Leg(end, STROKE_TIME, dosed=True),
-            Leg(end, 1.2, dosed=True),  # the puck slides and comes to rest
+            Leg(end, STROKE_TIME, exact=True),
+            Leg(end, 1.2, exact=True),  # the puck slides and comes to rest
         ]
 
 
 # Four times the others' policy steps: after 10,000 some hits of two policies in three, all trained
 # on one perception with lambda 1 and 1, still sent the puck 5 cm too far.
-RECIPE = Recipe(human_frames=650, robot_frames=2120, policy_steps=20_000)
+RECIPE = Recipe(human_frames=650, robot_frames=2120, policy_steps=10_000)

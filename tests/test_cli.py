@@ -10,9 +10,10 @@ import torch
 
 from lbw_minimal import video
 from lbw_minimal.training import InputError
-from tasks import TASKS, VIDEOS, WEIGHTS, commands
+from tasks import TASKS, VIDEOS, WEIGHTS, bare, commands
 from tasks.__main__ import main
-from tasks.world import Recording
+from tasks.commands import robustness
+from tasks.world import RED, Recording
 
 
 def clip(path, frames, size=84):
@@ -280,3 +281,32 @@ def test_probe_prints_what_the_keypoints_know(capfd):
     assert main(["probe", "push", "--frames", "100"]) == 0
     rows = {line.split()[0]: line.split()[1:] for line in capfd.readouterr().out.splitlines()}
     assert float(rows["tip_x"][0]) > 0.98 and rows["object_y"][0] == "-"
+
+
+def test_robustness_tries_each_change_that_a_scene_allows(capfd, monkeypatch):
+    """Reach has nothing red to paint, and a frame of noise tells a policy nothing."""
+    noise = np.random.default_rng(0).integers(0, 256, (84, 84, 3), np.uint8)
+    changes = {"as trained": robustness.unchanged, "noise": lambda frame: noise}
+    monkeypatch.setattr(robustness, "CHANGES", changes | {"object blue": robustness.unchanged})
+    assert main(["robustness", "reach", "--episodes", "2"]) == 0
+    rows = [line.split(" | ")[:2] for line in capfd.readouterr().out.splitlines()[2:]]
+    assert rows == [["| as trained", "2/2"], ["| noise", "0/2"]]
+
+
+def test_changes_of_the_picture_are_what_they_say():
+    frame = np.arange(84 * 84 * 3).reshape(84, 84, 3).astype(np.uint8)
+    down, left = robustness.moved(0, 1)(frame), robustness.moved(-2, 0)(frame)
+    assert (down[1:] == frame[:-1]).all() and (down[0] == frame[0]).all()
+    assert (left[:, :-2] == frame[:, 2:]).all() and (left[:, -1] == frame[:, -1]).all()
+    grey = np.array([[[10, 100, 250]]], np.uint8)
+    assert robustness.brighter(1.2)(grey).tolist() == [[[12, 120, 255]]]
+
+
+def test_what_is_red_is_painted_and_nothing_else():
+    env = bare("push")
+    env.reset(seed=0)
+    before = env.world.render().astype(int)
+    assert robustness.paint(env.world, RED, robustness.BLUE) == 1
+    after = env.world.render().astype(int)
+    changed = (before != after).any(-1)
+    assert 20 < changed.sum() < 200 and (after - before)[changed][:, 2].mean() > 50

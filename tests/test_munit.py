@@ -177,6 +177,19 @@ def test_file_of_another_network_is_refused(tmp_path):
         munit.load(tmp_path / "other.safetensors", "push")
 
 
+def test_a_shared_encoder_is_written_once(tmp_path):
+    sizes = []
+    for shared in (True, False):
+        model = MUNIT(4, shared_content=shared)
+        munit.save(tmp_path / "munit.safetensors", model, torch.zeros(8), "push")
+        sizes.append((tmp_path / "munit.safetensors").stat().st_size)
+        loaded, _ = munit.load(tmp_path / "munit.safetensors", "push")
+        for a, b in zip(loaded.parameters(), model.parameters(), strict=True):
+            assert torch.equal(a, b.half().float())
+    encoder = sum(p.numel() for p in model.E_c["y"].parameters())
+    assert sizes[1] - sizes[0] > 2 * encoder
+
+
 @pytest.fixture(scope="module")
 def videos():
     """A square that moves, dark on light for the human, light on dark for the robot."""

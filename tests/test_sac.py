@@ -8,7 +8,9 @@ import pytest
 import torch
 
 from lbw_minimal import sac as module
-from lbw_minimal.sac import SAC, Actor, ReplayBuffer, TwinCritic, best_actor, train
+from lbw_minimal.replay import ReplayBuffer
+from lbw_minimal.sac import SAC, best_actor, train
+from lbw_minimal.sac_networks import Actor, TwinCritic
 from lbw_minimal.training import Checkpoint, InputError, save_state
 
 
@@ -39,7 +41,7 @@ def batch_of(n=8, obs_dim=3, action_dim=2, seed=0, **fixed):
     g = torch.Generator().manual_seed(seed)
     draw = lambda *shape: torch.randn(*shape, generator=g)  # noqa: E731
     batch = {"obs": draw(n, obs_dim), "action": draw(n, action_dim).tanh(), "reward": draw(n)}
-    return batch | {"next_obs": draw(n, obs_dim), "terminal": torch.zeros(n)} | fixed
+    return batch | {"next_obs": draw(n, obs_dim), "discount": torch.full((n,), 0.95)} | fixed
 
 
 def small(**recipe):
@@ -103,7 +105,7 @@ def test_the_target_holds_the_entropy_term():
         sac.log_alpha.data.fill_(np.log(alpha))
         torch.manual_seed(1)
         targets.append(sac.critic_target(batch))
-    assert torch.allclose(targets[0] - targets[1], sac.gamma * 0.5 * log_pi, atol=1e-5)
+    assert torch.allclose(targets[0] - targets[1], 0.95 * 0.5 * log_pi, atol=1e-5)
 
 
 def test_the_target_takes_the_lesser_of_the_two_critics():
@@ -112,10 +114,10 @@ def test_the_target_takes_the_lesser_of_the_two_critics():
     assert (sac.critic_target(batch_of()) < -900).all()
 
 
-def test_only_a_terminal_state_ends_the_sum():
+def test_a_discount_of_zero_ends_the_sum():
     reward = torch.arange(8.0)
     sac = small()
-    ended = sac.critic_target(batch_of(reward=reward, terminal=torch.ones(8)))
+    ended = sac.critic_target(batch_of(reward=reward, discount=torch.zeros(8)))
     goes_on = sac.critic_target(batch_of(reward=reward))
     assert torch.equal(ended, reward) and not torch.isclose(goes_on, reward).any()
 
@@ -134,14 +136,14 @@ def test_the_actor_is_trained_with_alpha():
 
 
 def test_alpha_rises_when_entropy_is_below_its_target():
-    """Three actions have the target -6; entropy -5 is above it, so alpha falls, and -8 below."""
+    """Three actions: the target is -10.5. Entropy -5 is above it, so alpha falls, and -12 below."""
     sac = SAC(3, 3, width=16)
     log_pi = torch.full((8,), 5.0)
     sac.actor.sample = lambda s: (sac.actor(s)[0].tanh(), log_pi)
     before = sac.alpha
     sac.update(batch_of(action_dim=3))
     assert sac.alpha < before
-    log_pi[:] = 8.0
+    log_pi[:] = 12.0
     before = sac.alpha
     for _ in range(20):
         sac.update(batch_of(action_dim=3))
@@ -235,14 +237,44 @@ def test_the_time_limit_is_not_stored_as_the_end(monkeypatch):
         module, "ReplayBuffer", lambda *a: buffers.append(ReplayBuffer(*a)) or buffers[-1]
     )
     train(Walk(), steps=60, seed=0, random_steps=100, width=8)
-    assert len(buffers[0]) == 60 and (buffers[0].data["terminal"] == 0).all()
+    assert len(buffers[0]) == 60 and (buffers[0].data["discount"][:60] > 0).all()
+
+
+def remembered(n, ends, capacity=50):
+    """A buffer after steps t = 0, 1, ... of reward 2^t from state t; `ends`: how they ended."""
+    buffer = ReplayBuffer(1, 1, capacity, n, gamma=0.5)
+    for t, end in enumerate(ends):
+        buffer.add(
+            obs=t, action=-t, reward=2.0**t, next_obs=t + 1,
+            terminal=end == "terminal", truncated=end == "truncated",
+        )  # fmt: skip
+    return buffer, {k: v[: len(buffer)].reshape(-1).tolist() for k, v in buffer.data.items()}
+
+
+@pytest.mark.parametrize("end, worth", [("truncated", 1), ("terminal", 0)])
+def test_a_return_sums_n_steps_or_what_the_episode_has_left(end, worth):
+    """With gamma 1/2 every reward of 2^t is worth 2^t' at its first step t'."""
+    _, data = remembered(3, ["", "", "", "", end])
+    assert data["obs"] == [0, 1, 2, 3, 4] and data["action"] == [0, -1, -2, -3, -4]
+    assert data["reward"] == [3 * 1, 3 * 2, 3 * 4, 2 * 8, 1 * 16]
+    assert data["next_obs"] == [3, 4, 5, 5, 5]
+    assert data["discount"] == [1 / 8, 1 / 8, worth / 8, worth / 4, worth / 2]
+
+
+def test_a_return_does_not_run_on_into_the_next_episode():
+    _, data = remembered(4, ["", "truncated", "", "", "", ""])
+    assert data["obs"] == [0, 1, 2] and data["next_obs"] == [2, 2, 6]
+
+
+def test_one_step_is_the_publication():
+    _, data = remembered(1, ["", "", "terminal"])
+    assert data["reward"] == [1, 2, 4] and data["discount"] == [0.5, 0.5, 0]
+    assert data["next_obs"] == [1, 2, 3]
 
 
 def test_a_full_buffer_forgets_the_oldest():
-    buffer = ReplayBuffer(1, 1, 3)
-    for i in range(5):
-        buffer.add(obs=i, action=0, reward=i, next_obs=i, terminal=0)
-    assert sorted(buffer.data["reward"]) == [2, 3, 4] and len(buffer) == 3
+    buffer, data = remembered(1, [""] * 5, capacity=3)
+    assert sorted(data["reward"]) == [4, 8, 16] and len(buffer) == 3
 
 
 def test_a_resumed_run_ends_as_the_uninterrupted_one(tmp_path):
@@ -346,9 +378,8 @@ def test_the_actor_that_earns_most_without_noise_is_chosen():
         assert best_actor(env, sac, order, seed=0) is max(actors, key=earned)
 
 
-def test_actors_of_the_best_windows_and_of_the_end_compete(monkeypatch):
-    """Returns of 40 episodes rise and fall: of four windows of ten, two are kept, and the end
-    joins."""
+def test_averaged_actors_of_the_best_windows_and_of_the_end_compete(monkeypatch):
+    """Returns of 40 episodes rise and fall: of four windows of ten, two are kept, the end joins."""
     seen = []
 
     class Tide(Walk):
@@ -367,7 +398,7 @@ def test_actors_of_the_best_windows_and_of_the_end_compete(monkeypatch):
     monkeypatch.setattr(module, "CANDIDATES", 2)
     monkeypatch.setattr(module, "best_actor", choose)
     kept, log = train(Tide(), steps=800, seed=0, random_steps=20, width=8, batch=8)
-    assert len(log) == 40 and len(seen) == 6
+    assert len(log) == 40 and len(seen) == 3
     for p, q in zip(kept.test_actor.state_dict().values(), seen[2].values(), strict=True):
         assert torch.equal(p, q)
 

@@ -238,3 +238,11 @@ def test_weights_of_another_task_are_refused(tmp_path):
     tp.save(tmp_path / "z.safetensors", tp.Transporter(), "reach")
     with pytest.raises(InputError, match="reach"):
         tp.load(tmp_path / "z.safetensors", "push")
+
+
+def test_what_a_moved_view_shows_is_counted_back():
+    torch.manual_seed(0)
+    model, (x, y) = tp.Transporter(3), torch.rand(2, 4, 3, 84, 84)
+    moved = torch.tensor([0.1, -0.2]).expand(4, 1, 2)
+    _, z = model(x, y, x, moved=moved)
+    assert torch.allclose(z, model.keypoints(x) - moved)

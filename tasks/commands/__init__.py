@@ -22,6 +22,7 @@ COMMANDS = {  # each a file in this folder
     "gallery": "one page with every task's scene, demonstration and rollout",
     "viewer": "a task's scene as a page that turns with the mouse",
     "probe": "how well the keypoints tell where things are",
+    "robustness": "success under a moved camera, other light and colour",
     "bench": "steps, iterations and updates a second on this machine",
 }
 

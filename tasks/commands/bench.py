@@ -21,6 +21,7 @@ import torch
 from gymnasium.utils.performance import benchmark_step
 
 from lbw_minimal import munit, sac, transporter
+from lbw_minimal.replay import ReplayBuffer
 from tasks import TASKS, id_of
 from tasks.commands import Parser, at_least
 
@@ -150,11 +151,12 @@ def our_updates(width: int) -> Contestant:
     """Updates a second of the kit's SAC, batch drawn from a buffer of 1,000."""
     rng = np.random.default_rng(0)
     agent = sac.SAC(OBS_DIM, ACTION_DIM, width=width)
-    buffer = sac.ReplayBuffer(OBS_DIM, ACTION_DIM, 10_000)
+    buffer = ReplayBuffer(OBS_DIM, ACTION_DIM, 10_000, n=5, gamma=0.95)
     for _ in range(1000):
-        pair = {name: rng.normal(size=OBS_DIM) for name in ("obs", "next_obs")}
+        obs, next_obs = rng.normal(size=(2, OBS_DIM))
         action = rng.uniform(-1, 1, ACTION_DIM)
-        buffer.add(action=action, reward=0.0, terminal=0.0, **pair)
+        buffer.add(obs=obs, action=action, reward=0.0, next_obs=next_obs,
+                   terminal=False, truncated=False)  # fmt: skip
     return calls(lambda: agent.update(buffer.sample(rng, BATCH)))
 
 

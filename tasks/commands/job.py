@@ -33,7 +33,10 @@ FAST = {
     "policy_steps": 1000,
     "robot_frames": 200,
 }
-PERCEPTION = ("munit_iterations", "munit_width", "transporter_iterations", "K", "robot_frames")
+PERCEPTION = (
+    "robot_frames", "munit_iterations", "munit_width",
+    "transporter_iterations", "K", "shift", "hue",
+)  # fmt: skip
 
 
 def parser(name: str) -> Parser:
@@ -101,11 +104,12 @@ def check(name: str, args: argparse.Namespace, argv: list[str]) -> Job:
         "from_scratch": from_scratch,
         "video": hashlib.sha256(demo.tobytes()).hexdigest()[:16],
         "set": sorted(args.set),
+        "recipe": dataclasses.asdict(recipe),
     }
     run = Run(prepare_folder(args.out or Path("runs") / name, settings, args.resume))
     command = shlex.join(["python", "-m", "tasks", name, *argv])
     run.metrics["command"] = command
-    run.metrics["settings"] = settings | {"recipe": dataclasses.asdict(recipe)}
+    run.metrics["settings"] = settings
     machine = f"{platform.machine()}, {os.cpu_count()} cores, torch {torch.__version__}"
     run.metrics["machine"] = machine
     return Job(name, args, recipe, from_scratch, demo, random, perception, weights, command, run)

@@ -27,7 +27,7 @@ class Leg(NamedTuple):
     end: np.ndarray
     seconds: float
     # Speed decides here: a human's leg is then never bent or slower, and no rest follows it.
-    dosed: bool = False
+    exact: bool = False
 
 
 class TaskEnv(gym.Env, EzPickle):

@@ -23,9 +23,9 @@ def expert_actions(env: TaskEnv, rng: np.random.Generator | None = None) -> Iter
     uneven time, and sometimes end in a short pause.
     """
     start = env.arm.goal.copy()
-    for end, seconds, dosed in env.waypoints():
+    for end, seconds, exact in env.waypoints():
         bend = np.zeros(3)
-        if rng is not None and not dosed:
+        if rng is not None and not exact:
             seconds *= rng.uniform(0.9, 1.15)
             bend[[0, 2]] = rng.uniform(-1, 1, 2) * 0.08 * abs(end - start)[[2, 0]]
         steps = max(1, round(seconds / (DT * SUBSTEPS)))
@@ -35,7 +35,7 @@ def expert_actions(env: TaskEnv, rng: np.random.Generator | None = None) -> Iter
             wanted = start + s * (end - start) + np.sin(np.pi * s) * bend
             yield np.clip((wanted - env.arm.goal) / env.STEP, -1, 1).astype(np.float32)
         start = np.asarray(end, float)
-        if rng is not None and not dosed and rng.random() < 0.4:
+        if rng is not None and not exact and rng.random() < 0.4:
             for _ in range(rng.integers(1, 4)):
                 yield np.zeros(3, np.float32)
 

@@ -1,4 +1,4 @@
-"""Notebook 7, slide: how to dose a hit."""
+"""Notebook 7, slide: how hard to hit."""
 
 import numpy as np
 
