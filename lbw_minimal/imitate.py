@@ -43,6 +43,8 @@ class Recipe:
     shift: int = 0  # pixels by which the detector's training moves frames
     hue: int = 0  # degrees by which it turns hues
     policy_steps: int = 2_500  # environment steps of SAC
+    updates: int = 2  # of SAC's networks, an environment step
+    n_step: int = 5  # rewards that a return sums up
 
 
 @dataclass
@@ -212,7 +214,10 @@ def imitate(
     path = run.out / "policy.safetensors"
     if not path.exists():
         with run.stage("policy") as checkpoint:
-            agent, log = sac.train(env, steps=recipe.policy_steps, seed=seed, checkpoint=checkpoint)
+            agent, log = sac.train(
+                env, steps=recipe.policy_steps, updates=recipe.updates, n_step=recipe.n_step,
+                seed=seed, checkpoint=checkpoint,
+            )  # fmt: skip
             run.log("policy_log", log)
             sac.save(path, agent)
     return sac.load(path), env

@@ -186,7 +186,7 @@ def train(
     evaluate: Callable[[SAC], dict[str, float]] | None = None,
     evaluate_every: int = 10,
     updates: int = 2,
-    n: int = 5,
+    n_step: int = 5,
     gamma: float = 0.95,
     random_steps: int = 500,
     batch: int = 128,
@@ -196,18 +196,20 @@ def train(
 
     env: observations (S,) float32, actions (A,) in [-1, 1]. Its `info["reward_parts"]` and
     `info["is_success"]`, that of an episode's last step, go to the log and nowhere else. updates:
-    gradient steps an environment step, after `random_steps` uniformly random ones. n: steps that a
-    return sums up before the critics go on. gamma: discount; 0.95 looks 20 steps ahead, enough for
-    a reward that is paid at every step. evaluate(sac) joins the log every `evaluate_every`
-    episodes. recipe: arguments of `SAC`. Returns the agent and the log, a row an episode. A resumed
-    run does what the killed one would have done: each episode starts from (seed, episode), and
-    checkpoints are taken between episodes. The agent's test-time actor is chosen at the end, by
-    return: see `best_actor`.
+    gradient steps an environment step, after `random_steps` uniformly random ones. n_step: rewards
+    that a return sums up before the critics go on. gamma: discount; 0.95 looks 20 steps ahead,
+    enough for a reward that is paid at every step. evaluate(sac) joins the log every
+    `evaluate_every` episodes. recipe: arguments of `SAC`. Returns the agent and the log, a row an
+    episode. A resumed run does what the killed one would have done: each episode starts from (seed,
+    episode), and checkpoints are taken between episodes. The agent's test-time actor is chosen at
+    the end, by return: see `best_actor`.
     """
     checkpoint, rng = checkpoint or Checkpoint(None), seed_everything(seed)
     sac = SAC(_length(env.observation_space), _length(env.action_space), **recipe)
     sizes = sac.sizes["obs_dim"], sac.sizes["action_dim"]
-    buffer = ReplayBuffer(*sizes, steps + 1000, n, gamma)  # a short run can keep all it has seen
+    buffer = ReplayBuffer(
+        *sizes, steps + 1000, n_step, gamma
+    )  # a short run can keep all it has seen
     stateful = {"sac": sac, "buffer": buffer, "rng": rng}
     now, state = checkpoint.resume(stateful, step=0, log=[], candidates=[])
     bar = progress(steps, "policy", now.step)
@@ -224,7 +226,7 @@ def train(
             sac.normalise.observe(next_obs)
             rows.append({"reward": float(reward), **info.get("reward_parts", {})})
             obs, ended, now.step = next_obs, terminal or truncated, now.step + 1
-            if now.step > max(random_steps, n):
+            if now.step > max(random_steps, n_step):
                 sac.slow_down(now.step / steps)
                 losses += [sac.update(buffer.sample(rng, batch)) for _ in range(updates)]
         now.log.append(_row(len(now.log), now.step, rows, losses, info))
