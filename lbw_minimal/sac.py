@@ -207,9 +207,8 @@ def train(
     checkpoint, rng = checkpoint or Checkpoint(None), seed_everything(seed)
     sac = SAC(_length(env.observation_space), _length(env.action_space), **recipe)
     sizes = sac.sizes["obs_dim"], sac.sizes["action_dim"]
-    buffer = ReplayBuffer(
-        *sizes, steps + 1000, n_step, gamma
-    )  # a short run can keep all it has seen
+    # A short run can keep all it has seen.
+    buffer = ReplayBuffer(*sizes, steps + 1000, n_step, gamma)
     stateful = {"sac": sac, "buffer": buffer, "rng": rng}
     now, state = checkpoint.resume(stateful, step=0, log=[], candidates=[])
     bar = progress(steps, "policy", now.step)
