@@ -44,7 +44,7 @@ class Recipe:
     hue: int = 0  # degrees by which it turns hues
     policy_steps: int = 2_500  # environment steps of SAC
     updates: int = 2  # of SAC's networks, an environment step
-    n_step: int = 5  # rewards that a return sums up
+    n_step: int = 1  # rewards that a return sums up before the critics go on
 
 
 @dataclass

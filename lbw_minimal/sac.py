@@ -3,10 +3,10 @@ paper.
 
 In: a Gymnasium environment with vector observations and actions in [-1, 1]. Out: a policy and a log
 with a row an episode. Not in the publication: LayerNorm in the critics (keeps Q from running away
-when steps are few), running normalisation of observations, returns over five steps, two updates a
-step, a lower target entropy, a learning rate that falls towards the end, an averaged copy of the
-actor, and a last round without noise in which the averaged actors of the best episodes compete for
-acting at test time.
+when steps are few), running normalisation of observations, two updates a step, a lower target
+entropy, a learning rate that falls towards the end, an averaged copy of the actor, a last round
+without noise in which the averaged actors of the best episodes compete for acting at test time,
+and, where a recipe asks for them, returns over several steps.
 """
 
 from __future__ import annotations
@@ -186,7 +186,7 @@ def train(
     evaluate: Callable[[SAC], dict[str, float]] | None = None,
     evaluate_every: int = 10,
     updates: int = 2,
-    n_step: int = 5,
+    n_step: int = 1,
     gamma: float = 0.95,
     random_steps: int = 500,
     batch: int = 128,
