@@ -36,13 +36,13 @@ class Recipe:
 
     human_frames: int  # frames the translation sees: the demonstration and random motion (Table I)
     robot_frames: int  # frames of random robot motion (Table I)
-    munit_iterations: int = 900
-    munit_width: int = 16  # channels of the first layer
+    munit_iterations: int = 1200
+    munit_width: int = 20  # channels of the first layer
     transporter_iterations: int = 600
     K: int = 5  # keypoints
     shift: int = 0  # pixels by which the detector's training moves frames
     hue: int = 0  # degrees by which it turns hues
-    policy_steps: int = 2_500  # environment steps of SAC
+    policy_steps: int = 3_000  # environment steps of SAC
     updates: int = 2  # of SAC's networks, an environment step
     n_step: int = 1  # rewards that a return sums up before the critics go on
 

@@ -182,7 +182,7 @@ def train(
     *,
     iterations: int,
     seed: int,
-    width: int = 16,
+    width: int = 20,
     batch: int = 4,
     device: str = "cpu",
     checkpoint: Checkpoint | None = None,

@@ -81,7 +81,7 @@ class MUNIT(nn.Module):
     """E^c, E^s and G of both domains, "x" (human) and "y" (robot)."""
 
     def __init__(
-        self, width: int = 16, style_dim: int = 8, blocks: int = 2, shared_content: bool = True
+        self, width: int = 20, style_dim: int = 8, blocks: int = 2, shared_content: bool = True
     ):
         super().__init__()
         self.sizes = dict(

@@ -136,14 +136,14 @@ def test_the_actor_is_trained_with_alpha():
 
 
 def test_alpha_rises_when_entropy_is_below_its_target():
-    """Three actions: the target is -10.5. Entropy -5 is above it, so alpha falls, and -12 below."""
+    """Three actions: the target is -3. Entropy -2 is above it, so alpha falls, and -5 below."""
     sac = SAC(3, 3, width=16)
-    log_pi = torch.full((8,), 5.0)
+    log_pi = torch.full((8,), 2.0)
     sac.actor.sample = lambda s: (sac.actor(s)[0].tanh(), log_pi)
     before = sac.alpha
     sac.update(batch_of(action_dim=3))
     assert sac.alpha < before
-    log_pi[:] = 12.0
+    log_pi[:] = 5.0
     before = sac.alpha
     for _ in range(20):
         sac.update(batch_of(action_dim=3))
@@ -407,12 +407,21 @@ def test_the_learning_rates_stay_then_fall_to_zero():
     sac = SAC(1, 1, width=8, critic_lr=1e-3, actor_lr=5e-4)
 
     def rates(passed):
-        sac.slow_down(passed)
+        sac.anneal(passed)
         return [group["lr"] for group in sac.optimizer.param_groups]
 
     assert rates(0.1) == rates(0.3) == [1e-3, 5e-4]
     assert rates(0.65) == pytest.approx([5e-4, 2.5e-4])
     assert rates(1.0) == rates(1.1) == [0, 0]
+
+
+def test_the_target_entropy_falls_from_the_publications_and_stays():
+    sac = SAC(1, 2, width=8)
+    targets = [sac.target_entropy]
+    for passed in (0.0, 0.35, 0.7, 1.0):
+        sac.anneal(passed)
+        targets.append(sac.target_entropy)
+    assert targets == pytest.approx([-2, -2, -4.5, -7, -7])
 
 
 def test_it_learns_to_stand_at_the_right_place():
