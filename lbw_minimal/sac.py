@@ -32,9 +32,9 @@ from lbw_minimal.training import (
     seed_everything,
 )
 
-# Aimed at, per number of an action: the publication's at first, to find things out, and little
-# noise in the end, for a hit takes just the right strength. It falls over 70 % of the training.
-ENTROPY_FROM, ENTROPY_TO, ENTROPY_FALLEN = -1.0, -3.5, 0.7
+# Of the target entropy, per number of an action: where it ends, with little noise, for a hit takes
+# just the right strength, and the share of the training over which it falls to that.
+ENTROPY_TO, ENTROPY_FALLEN = -3.5, 0.7
 WINDOW = 10  # episodes whose mean return makes the averaged actor at their end a candidate
 CANDIDATES = 3  # windows that are kept: training goes up and down
 # episodes without noise for each candidate; with noise an actor may hit right, without too hard
@@ -48,7 +48,8 @@ class SAC:
 
     obs_dim, action_dim: sizes of the vectors; actions are in [-1, 1]. tau: pace of the target
     critics. alpha: first temperature, for rewards of about 1 a step. average: pace of `test_actor`,
-    the actor's mean over some 200 updates, until `train` puts the best one there.
+    the actor's mean over some 200 updates, until `train` puts the best one there. entropy: aimed at
+    in the beginning, per number of an action; -1 is the publication's.
     """
 
     def __init__(
@@ -62,6 +63,7 @@ class SAC:
         actor_lr: float = 1e-3,
         alpha: float = 0.02,
         average: float = 0.005,
+        entropy: float = -1.0,
     ):
         self.tau, self.average = tau, average
         self.normalise = Normaliser(obs_dim)
@@ -69,7 +71,8 @@ class SAC:
         self.sizes = self.actor.sizes
         self.critic = TwinCritic(obs_dim, action_dim, width)
         self.log_alpha = torch.tensor(math.log(alpha), requires_grad=True)
-        self.target_entropy = ENTROPY_FROM * action_dim
+        self.entropy = entropy
+        self.target_entropy = entropy * action_dim
         self.test_actor = deepcopy(self.actor).requires_grad_(False)
         self.target = deepcopy(self.critic).requires_grad_(False)
         # One optimizer for all: the calls, not the arithmetic, are what a small network costs.
@@ -99,7 +102,7 @@ class SAC:
         for group, rate in zip(self.optimizer.param_groups, self.rates, strict=True):
             group["lr"] = share * rate
         fallen = min(1.0, passed / ENTROPY_FALLEN)
-        target = ENTROPY_FROM + fallen * (ENTROPY_TO - ENTROPY_FROM)
+        target = self.entropy + fallen * (ENTROPY_TO - self.entropy)
         self.target_entropy = target * self.sizes["action_dim"]
 
     def act(self, obs: np.ndarray, deterministic: bool = False) -> np.ndarray:

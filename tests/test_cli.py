@@ -132,6 +132,10 @@ def no_such_value(folder):
     return ["push", "--set", "policy_steps=many"], "'many'"
 
 
+def a_value_that_is_no_number(folder):
+    return ["push", "--set", "entropy=nan"], "finite number"
+
+
 def a_field_of_perception_that_is_not_trained(folder):
     return ["push", "--set", "K=4"], "--from-scratch"
 
@@ -259,9 +263,11 @@ def test_no_command_prints_the_tasks_and_three_commands_to_try(capfd):
 
 def test_the_recipe_is_set_and_the_report_says_so(tmp_path):
     field = "policy_steps=60"
-    assert main(["reach", "--episodes", "1", "--out", str(tmp_path), "--set", field]) == 0
+    fields = ["--set", field, "--set", "entropy=-2.5"]
+    assert main(["reach", "--episodes", "1", "--out", str(tmp_path), *fields]) == 0
     metrics = json.loads((tmp_path / "metrics.json").read_text())
     assert metrics["settings"]["recipe"]["policy_steps"] == 60
+    assert metrics["settings"]["recipe"]["entropy"] == -2.5
     assert json.loads((tmp_path / "policy_log.json").read_text())[-1]["step"] < 200
     assert field in (tmp_path / "report.html").read_text()
 

@@ -422,6 +422,9 @@ def test_the_target_entropy_falls_from_the_publications_and_stays():
         sac.anneal(passed)
         targets.append(sac.target_entropy)
     assert targets == pytest.approx([-2, -2, -4.5, -7, -7])
+    quiet = SAC(1, 2, width=8, entropy=-3.5)
+    quiet.anneal(0.1)
+    assert quiet.target_entropy == pytest.approx(-7)
 
 
 def test_it_learns_to_stand_at_the_right_place():

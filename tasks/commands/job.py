@@ -6,6 +6,7 @@ import argparse
 import dataclasses
 import hashlib
 import json
+import math
 import os
 import platform
 import shlex
@@ -154,13 +155,20 @@ def read_settings(given: list[str], from_scratch: bool) -> dict[str, Any]:
             )
         if name in PERCEPTION and not from_scratch:
             raise InputError(f"--set {text}: perception is not trained here; add --from-scratch.")
-        try:
-            out[name] = int(value)
-        except ValueError:
-            out[name] = 0
-        if out[name] < 1:
-            raise InputError(f"--set {text}: {value!r} is no whole number of 1 or more.")
+        out[name] = read_number(text, value, whole=fields[name].type == "int")
     return out
+
+
+def read_number(text: str, value: str, whole: bool) -> float:
+    """The value of a setting: a whole number of 1 or more, or else any finite number."""
+    try:
+        number = int(value) if whole else float(value)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number) or (whole and number < 1):
+        kind = "whole number of 1 or more" if whole else "finite number"
+        raise InputError(f"--set {text}: {value!r} is no {kind}.")
+    return number
 
 
 def prepare_folder(out: Path, settings: dict[str, Any], resume: bool) -> Path:
