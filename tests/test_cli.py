@@ -156,8 +156,9 @@ MISTAKES = (missing, text, truncated, no_frames, one_frame, tiny, still, unknown
             unknown_task_to_film, no_task_to_film, nothing_to_resume, other_tasks_weights,
             cut_weights, no_weights, no_cuda, no_such_device, literal_without_a_mend, no_episodes,
             another_commands_option, an_option_that_is_none, one_argument_too_many, no_seed,
-            no_such_field, no_such_value, a_value_that_is_no_number, a_field_of_perception_that_is_not_trained,
-            replaying_and_learning, weights_beside_training,
+            no_such_field, no_such_value, a_value_that_is_no_number,
+            a_field_of_perception_that_is_not_trained, replaying_and_learning,
+            weights_beside_training,
             a_device_where_nothing_learns_on_it)  # fmt: skip
 
 
