@@ -172,10 +172,6 @@ def save(path: Path | str, agent: SAC | Policy) -> None:
 def load(path: Path | str) -> Policy:
     """The policy that `save` wrote. Raises InputError if the file holds anything else."""
     saved = load_state(path)
-    if "agent" in saved:  # such a file held critics and optimizer, too
-        agent = saved["agent"]
-        observed = {n: torch.as_tensor(agent[f"obs_{n}"]) for n in ("count", "mean", "var")}
-        saved |= {"kind": "policy", "actor": agent["test_actor"], "normalise": observed}
     if saved.get("kind") != "policy":
         raise InputError(f"{path}: not a policy; give the file that SAC's training wrote.")
     actor, normalise = Actor(**saved["sizes"]), Normaliser(saved["sizes"]["obs_dim"])

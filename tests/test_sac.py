@@ -321,16 +321,6 @@ def test_a_policy_file_holds_what_acts_and_nothing_else(tmp_path):
     assert (tmp_path / "policy.safetensors").stat().st_size < 100_000
 
 
-def test_a_file_of_the_whole_training_still_acts(tmp_path):
-    """What was saved before policies had files of their own."""
-    sac, obs = trained()
-    state, seen = sac.state_dict(), sac.normalise
-    observed = {"obs_mean": seen.mean, "obs_var": seen.var, "obs_count": int(seen.count)}
-    save_state(tmp_path / "old.safetensors", {"sizes": sac.sizes, "agent": state | observed})
-    loaded = module.load(tmp_path / "old.safetensors")
-    assert (loaded.act(obs, deterministic=True) == sac.act(obs, deterministic=True)).all()
-
-
 def test_a_file_of_something_else_is_refused_by_name(tmp_path):
     save_state(tmp_path / "keypoints.safetensors", {"kind": "transporter", "K": 5})
     with pytest.raises(InputError, match=r"keypoints\.safetensors: not a policy"):
