@@ -10,6 +10,7 @@ import pytest
 
 from lbw_minimal.reward import MENDS
 from lbw_minimal.training import InputError
+from tasks import TASKS, WEIGHTS
 from tasks.commands import ablation, table
 
 ROOT = Path(__file__).parents[1]
@@ -92,19 +93,44 @@ def read(path):
     return json.loads(path.read_text())
 
 
-RUNS = sorted((RESULTS / "runs").glob("*/metrics.json"))
+RUNS, POLICIES = (sorted((RESULTS / name).glob("*/metrics.json")) for name in ("runs", "policies"))
 AGAIN, HUNDRED, LIMITS = (
     sorted((RESULTS / name).glob("*.json")) for name in ("again", "hundred", "limits")
 )
 
 
-@pytest.mark.parametrize(
-    "path", RUNS + AGAIN + HUNDRED + LIMITS, ids=lambda p: str(p.relative_to(RESULTS))
-)
-def test_shipped_run_is_of_the_present_recipe(path):
-    settings = read(path)["settings"]
+@pytest.mark.parametrize("path", POLICIES, ids=lambda p: p.parent.name)
+def test_shipped_policy_is_of_the_present_recipe(path):
+    metrics = read(path)
+    settings = metrics["settings"]
     recipe = import_module(f"tasks.{settings['task']}").RECIPE
     assert settings["recipe"] == dataclasses.asdict(recipe)
+    assert path.parent.name == f"{settings['task']}-{settings['seed']}"
+    assert settings["reward"] == "mended" and not settings["without"] and not settings["set"]
+    assert len(metrics["episodes"]) == 100
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_shipped_policy_comes_from_the_run_in_its_note(task):
+    note = read(WEIGHTS / task / "policy.json")
+    assert note == read(RESULTS / "policies" / f"{task}-0" / "metrics.json")
+    assert {"command", "settings", "machine"} <= set(note)
+    assert {"command", "machine"} <= set(read(WEIGHTS / task / "perception.json"))
+
+
+def policy_row(task):
+    """A task's line in the README: three trainings on the shipped perception."""
+    runs = [table.read(RESULTS / "policies", task, seed) for seed in range(3)]
+    seconds = sum(r["stages"]["policy"] for r in runs) / 3
+    row = [task, f"{table.PAPER[task]} %", table.percent(runs), table.each(runs)]
+    return [*row, f"{seconds:.0f} s", f"{runs[0]['steps']:,}"]
+
+
+def test_policies_are_as_good_as_the_readme_says():
+    assert len(POLICIES) == 3 * len(TASKS)
+    head = ["task", "paper", "success (95 % interval)", "by seed", "policy", "policy steps"]
+    text = table.markdown(head, [policy_row(task) for task in TASKS])
+    assert text in (ROOT / "README.md").read_text()
 
 
 @pytest.mark.parametrize("path", RUNS, ids=lambda p: p.parent.name)
