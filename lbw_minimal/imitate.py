@@ -44,7 +44,6 @@ class Recipe:
     hue: int = 0  # degrees by which it turns hues
     policy_steps: int = 3_000  # environment steps of SAC
     updates: int = 2  # of SAC's networks, an environment step
-    n_step: int = 1  # rewards that a return sums up before the critics go on
     entropy: float = -1.0  # SAC's target at first, per number of an action; it falls to -3.5
 
 
@@ -216,7 +215,7 @@ def imitate(
     if not path.exists():
         with run.stage("policy") as checkpoint:
             agent, log = sac.train(
-                env, steps=recipe.policy_steps, updates=recipe.updates, n_step=recipe.n_step,
+                env, steps=recipe.policy_steps, updates=recipe.updates,
                 entropy=recipe.entropy, seed=seed, checkpoint=checkpoint,
             )  # fmt: skip
             run.log("policy_log", log)

@@ -3,10 +3,9 @@ paper.
 
 In: a Gymnasium environment with vector observations and actions in [-1, 1]. Out: a policy and a log
 with a row an episode. Not in the publication: LayerNorm in the critics (keeps Q from running away
-when steps are few), running normalisation of observations, two updates a step, a target entropy and
-a learning rate that fall, an averaged copy of the actor, a last round without noise in which the
-averaged actors of the best episodes compete for acting at test time, and, where a recipe asks for
-them, returns over several steps.
+when steps are few), running normalisation of observations, two updates a step, a target entropy
+and a learning rate that fall, an averaged copy of the actor, and a last round without noise in
+which the averaged actors of the best episodes compete for acting at test time.
 """
 
 from __future__ import annotations
@@ -46,7 +45,8 @@ FALL_FROM = 0.3
 class SAC:
     """Actor, twin critics and temperature with their optimizers.
 
-    obs_dim, action_dim: sizes of the vectors; actions are in [-1, 1]. tau: pace of the target
+    obs_dim, action_dim: sizes of the vectors; actions are in [-1, 1]. gamma: discount; 0.95 looks
+    20 steps ahead, enough for a reward that is paid at every step. tau: pace of the target
     critics. alpha: first temperature, for rewards of about 1 a step. average: pace of `test_actor`,
     the actor's mean over some 200 updates, until `train` puts the best one there. entropy: aimed at
     in the beginning, per number of an action; -1 is the publication's.
@@ -58,6 +58,7 @@ class SAC:
         action_dim: int,
         *,
         width: int = 128,
+        gamma: float = 0.95,
         tau: float = 0.01,
         critic_lr: float = 1e-3,
         actor_lr: float = 1e-3,
@@ -65,7 +66,7 @@ class SAC:
         average: float = 0.005,
         entropy: float = -1.0,
     ):
-        self.tau, self.average = tau, average
+        self.gamma, self.tau, self.average = gamma, tau, average
         self.normalise = Normaliser(obs_dim)
         self.actor = Actor(obs_dim, action_dim, width)
         self.sizes = self.actor.sizes
@@ -111,12 +112,12 @@ class SAC:
         return Policy(actor, self.normalise).act(obs, deterministic)
 
     def critic_target(self, batch: Batch) -> torch.Tensor:
-        """y (B,) = R + discount (min_i Q'_i(s', a') - alpha log pi(a'|s')), a' ~ pi (`replay`)."""
+        """y (B,) = r + gamma (1 - terminal) (min_i Q'_i(s', a') - alpha log pi(a'|s')), a' ~ pi."""
         with torch.no_grad():
             s_next = self.normalise(batch["next_obs"])
             a_next, log_pi = self.actor.sample(s_next)
             value = self.target(s_next, a_next).amin(0) - self.log_alpha.exp() * log_pi
-            return batch["reward"] + batch["discount"] * value
+            return batch["reward"] + self.gamma * (1 - batch["terminal"]) * value
 
     def update(self, batch: Batch) -> dict[str, float]:
         """One gradient step of critics, actor and temperature; returns what the log is told."""
@@ -189,8 +190,6 @@ def train(
     evaluate: Callable[[SAC], dict[str, float]] | None = None,
     evaluate_every: int = 10,
     updates: int = 2,
-    n_step: int = 1,
-    gamma: float = 0.95,
     random_steps: int = 500,
     batch: int = 128,
     **recipe: Any,
@@ -199,19 +198,17 @@ def train(
 
     env: observations (S,) float32, actions (A,) in [-1, 1]. Its `info["reward_parts"]` and
     `info["is_success"]`, that of an episode's last step, go to the log and nowhere else. updates:
-    gradient steps an environment step, after `random_steps` uniformly random ones. n_step: rewards
-    that a return sums up before the critics go on. gamma: discount; 0.95 looks 20 steps ahead,
-    enough for a reward that is paid at every step. evaluate(sac) joins the log every
-    `evaluate_every` episodes. recipe: arguments of `SAC`. Returns the agent and the log, a row an
-    episode. A resumed run does what the killed one would have done: each episode starts from (seed,
-    episode), and checkpoints are taken between episodes. The agent's test-time actor is chosen at
-    the end, by return: see `best_actor`.
+    gradient steps an environment step, after `random_steps` uniformly random ones. evaluate(sac)
+    joins the log every `evaluate_every` episodes. recipe: arguments of `SAC`. Returns the agent and
+    the log, a row an episode. A resumed run does what the killed one would have done: each episode
+    starts from (seed, episode), and checkpoints are taken between episodes. The agent's test-time
+    actor is chosen at the end, by return: see `best_actor`.
     """
     checkpoint, rng = checkpoint or Checkpoint(None), seed_everything(seed)
     sac = SAC(_length(env.observation_space), _length(env.action_space), **recipe)
     sizes = sac.sizes["obs_dim"], sac.sizes["action_dim"]
     # A short run can keep all it has seen.
-    buffer = ReplayBuffer(*sizes, steps + 1000, n_step, gamma)
+    buffer = ReplayBuffer(*sizes, steps + 1000)
     stateful = {"sac": sac, "buffer": buffer, "rng": rng}
     now, state = checkpoint.resume(stateful, step=0, log=[], candidates=[])
     bar = progress(steps, "policy", now.step)
@@ -223,12 +220,12 @@ def train(
             random = now.step < random_steps
             action = _uniform(rng, env) if random else sac.act(obs)
             next_obs, reward, terminal, truncated, info = env.step(action)
-            buffer.add(obs=obs, action=action, reward=float(reward), next_obs=next_obs,
-                       terminal=terminal, truncated=truncated)  # fmt: skip
+            # `truncated` stays out: the time limit is the clock's doing, and s' keeps its value.
+            buffer.add(obs=obs, action=action, reward=reward, next_obs=next_obs, terminal=terminal)
             sac.normalise.observe(next_obs)
             rows.append({"reward": float(reward), **info.get("reward_parts", {})})
             obs, ended, now.step = next_obs, terminal or truncated, now.step + 1
-            if now.step > max(random_steps, n_step):
+            if now.step > random_steps:
                 sac.anneal(now.step / steps)
                 losses += [sac.update(buffer.sample(rng, batch)) for _ in range(updates)]
         now.log.append(_row(len(now.log), now.step, rows, losses, info))

@@ -41,7 +41,7 @@ def batch_of(n=8, obs_dim=3, action_dim=2, seed=0, **fixed):
     g = torch.Generator().manual_seed(seed)
     draw = lambda *shape: torch.randn(*shape, generator=g)  # noqa: E731
     batch = {"obs": draw(n, obs_dim), "action": draw(n, action_dim).tanh(), "reward": draw(n)}
-    return batch | {"next_obs": draw(n, obs_dim), "discount": torch.full((n,), 0.95)} | fixed
+    return batch | {"next_obs": draw(n, obs_dim), "terminal": torch.zeros(n)} | fixed
 
 
 def small(**recipe):
@@ -105,7 +105,7 @@ def test_the_target_holds_the_entropy_term():
         sac.log_alpha.data.fill_(np.log(alpha))
         torch.manual_seed(1)
         targets.append(sac.critic_target(batch))
-    assert torch.allclose(targets[0] - targets[1], 0.95 * 0.5 * log_pi, atol=1e-5)
+    assert torch.allclose(targets[0] - targets[1], sac.gamma * 0.5 * log_pi, atol=1e-5)
 
 
 def test_the_target_takes_the_lesser_of_the_two_critics():
@@ -114,10 +114,10 @@ def test_the_target_takes_the_lesser_of_the_two_critics():
     assert (sac.critic_target(batch_of()) < -900).all()
 
 
-def test_a_discount_of_zero_ends_the_sum():
+def test_only_a_terminal_state_ends_the_sum():
     reward = torch.arange(8.0)
     sac = small()
-    ended = sac.critic_target(batch_of(reward=reward, discount=torch.zeros(8)))
+    ended = sac.critic_target(batch_of(reward=reward, terminal=torch.ones(8)))
     goes_on = sac.critic_target(batch_of(reward=reward))
     assert torch.equal(ended, reward) and not torch.isclose(goes_on, reward).any()
 
@@ -237,44 +237,14 @@ def test_the_time_limit_is_not_stored_as_the_end(monkeypatch):
         module, "ReplayBuffer", lambda *a: buffers.append(ReplayBuffer(*a)) or buffers[-1]
     )
     train(Walk(), steps=60, seed=0, random_steps=100, width=8)
-    assert len(buffers[0]) == 60 and (buffers[0].data["discount"][:60] > 0).all()
-
-
-def remembered(n, ends, capacity=50):
-    """A buffer after steps t = 0, 1, ... of reward 2^t from state t; `ends`: how they ended."""
-    buffer = ReplayBuffer(1, 1, capacity, n, gamma=0.5)
-    for t, end in enumerate(ends):
-        buffer.add(
-            obs=t, action=-t, reward=2.0**t, next_obs=t + 1,
-            terminal=end == "terminal", truncated=end == "truncated",
-        )  # fmt: skip
-    return buffer, {k: v[: len(buffer)].reshape(-1).tolist() for k, v in buffer.data.items()}
-
-
-@pytest.mark.parametrize("end, worth", [("truncated", 1), ("terminal", 0)])
-def test_a_return_sums_n_steps_or_what_the_episode_has_left(end, worth):
-    """With gamma 1/2 every reward of 2^t is worth 2^t' at its first step t'."""
-    _, data = remembered(3, ["", "", "", "", end])
-    assert data["obs"] == [0, 1, 2, 3, 4] and data["action"] == [0, -1, -2, -3, -4]
-    assert data["reward"] == [3 * 1, 3 * 2, 3 * 4, 2 * 8, 1 * 16]
-    assert data["next_obs"] == [3, 4, 5, 5, 5]
-    assert data["discount"] == [1 / 8, 1 / 8, worth / 8, worth / 4, worth / 2]
-
-
-def test_a_return_does_not_run_on_into_the_next_episode():
-    _, data = remembered(4, ["", "truncated", "", "", "", ""])
-    assert data["obs"] == [0, 1, 2] and data["next_obs"] == [2, 2, 6]
-
-
-def test_one_step_is_the_publication():
-    _, data = remembered(1, ["", "", "terminal"])
-    assert data["reward"] == [1, 2, 4] and data["discount"] == [0.5, 0.5, 0]
-    assert data["next_obs"] == [1, 2, 3]
+    assert len(buffers[0]) == 60 and (buffers[0].data["terminal"] == 0).all()
 
 
 def test_a_full_buffer_forgets_the_oldest():
-    buffer, data = remembered(1, [""] * 5, capacity=3)
-    assert sorted(data["reward"]) == [4, 8, 16] and len(buffer) == 3
+    buffer = ReplayBuffer(1, 1, 3)
+    for i in range(5):
+        buffer.add(obs=i, action=0, reward=i, next_obs=i, terminal=0)
+    assert sorted(buffer.data["reward"]) == [2, 3, 4] and len(buffer) == 3
 
 
 def test_a_resumed_run_ends_as_the_uninterrupted_one(tmp_path):

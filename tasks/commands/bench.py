@@ -151,12 +151,12 @@ def our_updates(width: int) -> Contestant:
     """Updates a second of the kit's SAC, batch drawn from a buffer of 1,000."""
     rng = np.random.default_rng(0)
     agent = sac.SAC(OBS_DIM, ACTION_DIM, width=width)
-    buffer = ReplayBuffer(OBS_DIM, ACTION_DIM, 10_000, n=5, gamma=0.95)
+    buffer = ReplayBuffer(OBS_DIM, ACTION_DIM, 10_000)
     for _ in range(1000):
         obs, next_obs = rng.normal(size=(2, OBS_DIM))
         action = rng.uniform(-1, 1, ACTION_DIM)
         buffer.add(obs=obs, action=action, reward=0.0, next_obs=next_obs,
-                   terminal=False, truncated=False)  # fmt: skip
+                   terminal=False)  # fmt: skip
     return calls(lambda: agent.update(buffer.sample(rng, BATCH)))
 
 
