@@ -1,7 +1,7 @@
-"""Random changes of images that a detector of keypoints has to bear: poor cameras, shifts, hues.
+"""Random changes to images that a keypoint detector has to cope with: poor cameras, shifts, hues.
 
-In and out: images (B, 3, 84, 84) in [-1, 1] or somewhat beyond. All is drawn on the CPU, whose
-random state is in the checkpoint.
+In and out: images (B, 3, 84, 84) in [-1, 1] or somewhat beyond. Everything is drawn on the CPU,
+whose random state is in the checkpoint.
 """
 
 from __future__ import annotations

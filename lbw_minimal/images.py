@@ -1,6 +1,6 @@
 """Frames and images: what cameras, files and people see, and what networks take.
 
-Frames are (T, H, W, 3) uint8, images (B, 3, H, W) float in [-1, 1]. Beside the conversion: how far
+Frames are (T, H, W, 3) uint8, images (B, 3, H, W) float in [-1, 1]. Besides the conversion: how far
 an image is from the median frame of its video, which tells moving things from the background.
 """
 

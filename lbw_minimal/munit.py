@@ -43,7 +43,7 @@ MOTION_GAN = 20.0  # with 0 the critics hardly look at the arm: four fifths of t
 # Of the two Adams; both fall to 0 over the second half. With critics as slow as the generators the
 # arm stays blurred.
 LEARNING_RATE, CRITIC_RATE = 4e-4, 1.2e-3
-AVERAGE = 0.995  # decay a step of the averaged weights, which flicker less from frame to frame
+AVERAGE = 0.995  # decay per step of the averaged weights, which flicker less from frame to frame
 LOG_EVERY = 50  # steps
 MADE = {"x": "x_of_y", "y": "y_of_x"}  # which of `mean_images` are translations into a domain
 
@@ -163,7 +163,7 @@ def _update(model, critics, adam_G, adam_D, x, y, medians) -> dict[str, float]:
 
 @torch.no_grad()
 def _follow(average, model, step):
-    # A short memory at first, or the random start would stay in the average for long.
+    # A short memory at first, or the random start would stay in the average for a long time.
     decay = min(AVERAGE, step / (step + 10))
     for mean, p in zip(average.parameters(), model.parameters(), strict=True):
         mean.lerp_(p, 1 - decay)
@@ -274,7 +274,7 @@ def mean_images(model: MUNIT, human: np.ndarray, robot: np.ndarray) -> dict[str,
 def save(path: Path | str, model: MUNIT, style: torch.Tensor, task: str) -> None:
     """Write the model with its sizes, the robot style (style_dim,) to translate with, and its task.
 
-    In half precision, which is half the file and moves a translated pixel by a grey level at most.
+    In half precision, which halves the file and moves a translated pixel by a grey level at most.
     A shared encoder is written once.
     """
     weights = {name: w.half() for name, w in model.named_parameters()}
@@ -285,7 +285,7 @@ def save(path: Path | str, model: MUNIT, style: torch.Tensor, task: str) -> None
 def load(path: Path | str, task: str) -> tuple[MUNIT, torch.Tensor]:
     """Model and style that `save` wrote.
 
-    Raises InputError if the file holds another thing or another task.
+    Raises InputError if the file holds something else or belongs to another task.
     """
     saved = load_state(path)
     if saved.get("kind") != "munit":

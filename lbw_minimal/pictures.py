@@ -2,7 +2,7 @@
 
 In: frames (T, 84, 84, 3) uint8, keypoints z (T, K, 2) in [-1, 1] (x right, y down), logs. Out:
 images, figures, films, and each of them as a data URI. The colours are Okabe and Ito's, which
-colour-blind readers tell apart.
+colour-blind readers can tell apart.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ STYLE: dict[Any, Any] = {
     "legend.frameon": False,
     "legend.fontsize": 9,
     "figure.constrained_layout.use": True,
-    "svg.hashsalt": "lbw",  # else the same figure gives another file each time
+    "svg.hashsalt": "lbw",  # or the same figure gives a different file each time
 }
 
 

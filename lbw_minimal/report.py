@@ -169,9 +169,9 @@ def write_report(
     """Write the page of a run, whole or not at all; what is None or empty is left out.
 
     demo, translated: (N, 84, 84, 3) uint8; z_demo (N, K, 2): the keypoints found on `translated`.
-    log: the policy's, a row an episode. episode: a test episode's "frames" (T, 84, 84, 3) uint8,
+    log: the policy's, a row per episode. episode: a test episode's "frames" (T, 84, 84, 3) uint8,
     "z" (T, K, 2) (or observations whose first 2K numbers are z), and "parts", a dict of reward
-    parts a step. metrics: as in metrics.json: "success", "episodes", "stages" in s, "perception",
+    parts per step. metrics: as in metrics.json: "success", "episodes", "stages" in s, "perception",
     "settings", "machine". scene_html: a page of its own. command: what makes this run again.
     """
     metrics, episode = metrics or {}, episode or {}

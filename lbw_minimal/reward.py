@@ -117,7 +117,7 @@ class MendedReward:
         return self.z_E[min(t + 1, self.last)]
 
     def clock(self, t: int) -> float:
-        """How far the demonstration is at step t, 0 to 1."""
+        """How far along the demonstration is at step t, 0 to 1."""
         return min(t, self.last) / self.last
 
 

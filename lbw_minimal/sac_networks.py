@@ -15,9 +15,9 @@ import torch
 import torch.nn.functional as F
 from torch import nn
 
-# Below it is a keypoint's noise: dividing by less would blow the noise up to a signal.
+# Below this lies a keypoint's noise: dividing by less would blow it up into a signal.
 MIN_OBS_STD = 0.02
-# exp(-5) acts as good as deterministic; exp(2) is past tanh's ends.
+# exp(-5) is as good as deterministic; exp(2) is past tanh's ends.
 LOG_STD_MIN, LOG_STD_MAX = -5.0, 2.0
 
 

@@ -133,7 +133,7 @@ class Checkpoint:
     def resume(
         self, stateful: dict[str, Any], **variables: Any
     ) -> tuple[SimpleNamespace, Callable[[], dict]]:
-        """Take a training up where it was: the loop's variables now, and the state for `save`.
+        """Resume a training where it stopped: the loop's variables now, and the state for `save`.
 
         stateful: networks and optimizers by name, all that have `state_dict` and `load_state_dict`,
         and NumPy generators. They are set to the saved state in place. variables: what the loop

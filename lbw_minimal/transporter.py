@@ -38,7 +38,7 @@ CROWDING_WEIGHT = 0.06  # at 0 one thing may take all K keypoints, at 0.3 some s
 # At 0 two keypoints may share arm and object as "the left one" and "the right one".
 IDENTITY_WEIGHT = 0.02
 PAIR_GAP = 20  # most frames between the two of a pair; further apart is as good as drawn freely
-# Of the pairs, drawn freely. Within PAIR_GAP frames the object has moved in only 4 of 10 pairs.
+# Share of pairs drawn freely. Within PAIR_GAP frames the object has moved in only 4 of 10 pairs.
 FREE_SHARE = 0.5
 MOTION = 10.0  # weight of what differs from the median frame, see `motion_weight`
 LEARNING_RATE = 2e-3  # falls to 0 along a cosine
@@ -163,7 +163,7 @@ class Transporter(nn.Module):
     ) -> tuple[torch.Tensor, torch.Tensor]:
         """y rebuilt from x, (B, 3, 84, 84), and y's keypoints (B, K, 2).
 
-        The detector looks at `y_seen` in place of y, if it is given, which shows everything `moved`
+        If `y_seen` is given, the detector looks at it instead of y; there everything has `moved` by
         (B, 1, 2) in units of z.
         """
         with torch.no_grad():  # `transport` would stop the gradient anyway; this saves its cost
@@ -175,7 +175,7 @@ class Transporter(nn.Module):
 def _draw_pairs(lengths, n, rng):
     """Indices (n,) of sources and (n,) of targets into the joined videos.
 
-    Every video is target equally often.
+    Every video is the target equally often.
     """
     ends = np.cumsum(lengths)
     starts = ends - lengths
@@ -307,7 +307,7 @@ def save(path: Path | str, model: Transporter, task: str) -> None:
 def load(path: Path | str, task: str | None = None) -> Transporter:
     """The model in a file, on the CPU; any task's if `task` is None.
 
-    Raises InputError if the file holds another thing or another task.
+    Raises InputError if the file holds something else or belongs to another task.
     """
     saved = load_state(path)
     if saved.get("kind") != "transporter":

@@ -32,7 +32,7 @@ LOOK_AT = 60  # frames that the checks of motion and camera look at, spread over
 MOVED = 16
 MOVED_SHARE = 0.005  # 35 pixels: less is noise, or an object too small for a keypoint
 # The share of frames in which the steadiest two fifths of the edges stay where they are. It is 0.93
-# or more in 20 rendered and 2 real clips, with noise of 8 levels too. It is 0.66 or less if a real
+# or more in 20 rendered and 2 real clips, even with 8 levels of noise; 0.66 or less if a real
 # clip is panned by 15 pixels, 0.80 if a drawn room is panned by 10, 0.43 or less if shaken by 2.
 STEADY = 0.87
 EDGE = 3  # grey levels per pixel: weaker edges drown in noise
@@ -41,9 +41,9 @@ EDGE = 3  # grey levels per pixel: weaker edges drown in noise
 def read(path: Path | str) -> tuple[np.ndarray, list[str]]:
     """Frames (T, 84, 84, 3) uint8 RGB of a video's central square, and warnings, a sentence each.
 
-    A longer video than MAX_FRAMES is thinned evenly. Only one full-size frame is held at a time.
-    Raises InputError if the file is missing, no video, cut short, shorter than two frames, smaller
-    than 84x84, or if nothing moves in it.
+    A video longer than MAX_FRAMES is thinned evenly. Only one full-size frame is held at a time.
+    Raises InputError if the file is missing, not a video, cut short, shorter than two frames,
+    smaller than 84x84, or if nothing moves in it.
     """
     path = Path(path)
     if path.is_dir():

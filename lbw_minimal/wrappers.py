@@ -1,7 +1,7 @@
 """Two Gymnasium wrappers that turn an environment of images into the paper's, for any agent.
 
 `KeypointObservation`: RGB frame O_t -> keypoints z_t = Psi(O_t). `KeypointRewardWrapper`: the
-environment's own reward is dropped for r_t of Eq. 8. What an agent sees and earns is a function of
+environment's own reward is replaced by r_t of Eq. 8. What an agent sees and earns is a function of
 the frames, the demonstration and the number of steps taken, and of nothing else.
 """
 
@@ -47,8 +47,9 @@ class KeypointRewardWrapper(gym.Wrapper, RecordConstructorArgs):
     before, the way to where the demonstration will be, and how much of that has passed, 0 to 1.
 
     The clock alone would do in theory, but then the agent would have to learn the demonstration by
-    heart. How things move decides a hit. The step before the last tells where the tip is drawn to:
-    its goal leads it, and no frame shows a goal. What each is worth: solutions/results/README.md.
+    heart. How things move decides a hit. The step before the last tells where the tip is being
+    pulled: its goal runs ahead of it, unseen in the frames. What each is worth:
+    solutions/results/README.md.
     """
 
     def __init__(self, env: gym.Env, reward: KeypointReward):
