@@ -1,4 +1,4 @@
-"""`python -m tasks`: picks the command, and says what there is where none is named.
+"""`python -m tasks`: picks the command, and says what there is if none is named.
 
 `python -m tasks TASK ...` runs the paper on one task; the other commands are the files in
 `tasks/commands/`.

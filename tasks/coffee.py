@@ -3,8 +3,8 @@
 The paper's 300 steps; the rest after Meta-World's coffee-push-v2 (Farama-Foundation/Metaworld,
 commit ffe2cd37 of March 2021, metaworld/envs: mujoco/sawyer_xyz/v2/sawyer_coffee_push_v2.py,
 assets_v2/objects/assets/mug.xml; the paper names no version): the mug's size and mass, success
-within 7 cm. Friction, way and machine are ours. The human's background is cluttered and moves, as
-in the paper's Figure 4. From top to bottom: constants, scene, success, the expert, the recipe.
+within 7 cm. Friction, distance and machine are ours. The human's background is cluttered and moves,
+as in the paper's Figure 4. From top to bottom: constants, scene, success, the expert, the recipe.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ MUG_START = 0.51  # m, along x
 OUTLET = 0.69  # m, along x: 18 cm further; Meta-World has 15 to 25 cm
 SCATTER = (0.49, 0.69)  # m, where random data puts the mug
 SUCCESS = 0.07  # m, distance from mug to outlet: Meta-World's
-HEAD, COLUMN = (0.10, 0.19), 0.755  # m: the machine's head from and to, the column's x
+HEAD, COLUMN = (0.10, 0.19), 0.755  # m: where the machine's head begins and ends, the column's x
 MACHINE, METAL = (0.16, 0.20, 0.26, 1), (0.48, 0.50, 0.52, 1)
 WALL = 0.28  # m along y, the tiles of the human's kitchen
 LAMP, PERIOD = (0.62, 0.10, 0.23), 1.3  # m: its middle, its swing and its height; s: to and fro

@@ -2,7 +2,7 @@
 
 The paper's 300 steps; the rest after Meta-World's drawer-close-v2 (Farama-Foundation/Metaworld,
 commit ffe2cd37 of March 2021, metaworld/envs: mujoco/sawyer_xyz/v2/sawyer_drawer_close_v2.py,
-assets_v2/objects/assets/drawer.xml; the paper names no version): the way of 15 cm and where it
+assets_v2/objects/assets/drawer.xml; the paper names no version): the 15 cm of travel and where it
 counts as shut. Cabinet, handle, mass and the dry friction are ours. From top to bottom: constants,
 scene, success, the expert, the recipe.
 """
@@ -25,7 +25,7 @@ CABINET = (0.12, 0.20, 0.14)  # m, depth, width, height
 PANEL = (0.012, 0.16, 0.08)  # m, the drawer's front: thickness, width, height
 # m: how far it stands out, width, height; as large in the picture as a cube
 HANDLE = (0.045, 0.10, 0.044)
-REACH = PANEL[0] + HANDLE[0]  # m, the grip's way from the drawer's face
+REACH = PANEL[0] + HANDLE[0]  # m, the grip's distance from the drawer's face
 HEIGHT = 0.065  # m, the handle's centre above the table
 DRAWER_MASS = 0.8  # kg (Meta-World: 0.38 in all)
 # N, dry: nothing slides on by itself. Meta-World damps it, 2 N s/m. With 18 random actions shut it
@@ -74,7 +74,7 @@ class Drawer(TaskEnv):
         q = self.np_random.uniform(-OPEN, 0) if scatter else -OPEN + abs(offset[0])
         self.world.p.resetJointState(self.drawer, 0, q)
         tip, top = self.arm.goal, HEIGHT + PANEL[2] / 2 + 0.02
-        # it would be in the drawer
+        # or the tip would start inside the drawer
         if scatter and tip[0] > FRONT + q - REACH - 2 * FINGER and tip[2] < top:
             self.arm.reset(np.array([self.WORKSPACE[0][0] + 0.01, 0, tip[2]]))
 
@@ -91,7 +91,7 @@ class Drawer(TaskEnv):
 
     def waypoints(self) -> list[Leg]:
         before = self.object_position() - (self.CONTACT + 0.02, 0, 0)
-        # the goal leads: friction takes as much
+        # the goal runs ahead: friction takes up as much
         end = self.target_position() - (self.CONTACT - 0.02, 0, 0)
         return [
             Leg(before, 0.9),

@@ -2,8 +2,8 @@
 
 After the paper's FetchPush (openai/gym 0.18.0, gym/envs/robotics: fetch/push.py,
 assets/fetch/push.xml): the cube's size, success within 5 cm, 50 steps. Its mass, its friction and
-its way are ours. The paper says puck, and shows a red cube in its Figure 5: so ours is red. From
-top to bottom: constants, scene, success, the expert, the recipe.
+how far it has to go are ours. The paper says puck, and shows a red cube in its Figure 5: so
+ours is red. From top to bottom: constants, scene, success, the expert, the recipe.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ CUBE = 0.05  # m, edge: Fetch's
 CUBE_MASS = 0.4  # kg (Fetch: 2); a 0.2 kg cube shoots away when it is pinched from above
 CUBE_FRICTION = 0.6  # (Fetch: 1.0); at 1.0 a push at half its height tips it over
 CUBE_START = 0.53  # m, along x
-TARGET = 0.68  # m, along x: 15 cm further; Fetch draws start and target, 17 cm apart in the mean
+TARGET = 0.68  # m, along x: 15 cm further; Fetch draws start and target, 17 cm apart on average
 SCATTER = (0.50, 0.70)  # m, where random data puts the cube
 SUCCESS = 0.05  # m, distance from cube to target: Fetch's `distance_threshold`
 

@@ -25,7 +25,7 @@ class Reach(TaskEnv):
         self.world.sphere(RADIUS, TARGET, GREEN, solid=False)
 
     def place(self, offset: np.ndarray, scatter: bool) -> None:
-        """The target stands still, in random data too: only the arm moves in this task."""
+        """The target stands still, even in random data: only the arm moves in this task."""
 
     def object_position(self) -> np.ndarray:
         return self.arm.tip_pose()[0]

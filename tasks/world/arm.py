@@ -4,7 +4,7 @@ In: a goal for the arm's tip, position in metres and orientation. Out: joint tor
 tip behave like a critically damped mass on springs, in all six directions alike, whatever the arm's
 pose:
     tau = J^T Lambda (kp e - kd v) + h + N^T M (posture),    Lambda = (J M^-1 J^T)^-1
-After Khatib 1987, IEEE J. Robotics and Automation 3(1), 43-53, limit of speeds included; kp and
+After Khatib 1987, IEEE J. Robotics and Automation 3(1), 43-53, speed limit included; kp and
 the posture are ours.
 """
 
@@ -27,7 +27,7 @@ FRICTION = 0.4  # of gripper and hand: rougher ones stick to a pushed object and
 # tip's acceleration: with 10 instead of 40 1/s^2 slide's elbow swings up when actions alternate.
 POSTURE = 1 / 40
 YIELD = 0.003  # m out of its box, where a tip gives way; in free motion it is 1.1 mm at most
-EXACT = 1e-7  # m and rad, where a reset is content; Bullet's poses are exact to 4e-8
+EXACT = 1e-7  # m and rad, close enough for a reset; Bullet's poses are exact to 4e-8
 
 
 class Arm:
@@ -35,7 +35,7 @@ class Arm:
 
     `goal` is the tip's goal position in metres; the orientation goal is always straight down.
     box: the corners (low, high) of the goal's box, in m. kp: the tip's stiffness in 1/s^2.
-    overspeed: how many times its rated speeds the joints may reach.
+    overspeed: how many times their rated speeds the joints may reach.
     """
 
     def __init__(
@@ -78,7 +78,7 @@ class Arm:
             if name not in self.spec.reach_links:
                 client.setCollisionFilterGroupMask(self.body, link, 0, 0)
         client.setCollisionFilterGroupMask(self.body, -1, 0, 0)
-        # Bullet gives every joint a velocity motor at birth; it would brake the torques.
+        # Bullet gives every joint a velocity motor at birth; it would work against the torques.
         n = len(self.joints)
         client.setJointMotorControlArray(
             self.body, self.joints, client.VELOCITY_CONTROL, forces=[0] * n
@@ -169,7 +169,7 @@ class Arm:
         tau = self._bias - self._Kq @ q - self._Kd @ dq
         over = np.abs(tau) > self.effort
         if over.any():
-            # One factor for all joints. Where each was cut by itself, the tip left its line and the
+            # One factor for all joints. When each was cut on its own, the tip left its line and the
             # elbow swung up: slide's tip was up to 63 cm out of its box, its joints at 61 rad/s.
             drive, room = tau - self._h, np.copysign(self.effort, tau) - self._h
             tau = self._h + max(0.0, (room[over] / drive[over]).min()) * drive

@@ -26,7 +26,7 @@ class Leg(NamedTuple):
 
     end: np.ndarray
     seconds: float
-    # Speed decides here: a human's leg is then never bent or slower, and no rest follows it.
+    # Speed decides here: a human's leg is then never bent or slowed, and no rest follows it.
     exact: bool = False
 
 
@@ -51,8 +51,8 @@ class TaskEnv(gym.Env, EzPickle):
     # Every task states these; the values here are what most tasks use.
     STEP = 0.03  # m, the tip's goal moves this far per control step at full action
     # How far, in m, the goal may run ahead of the tip. No frame shows the goal: the policy has to
-    # infer it from how the tip moved. One that saw z_t alone solved push in no episode with 0.05
-    # instead of 0.03.
+    # infer it from how the tip moved. With 0.05 instead of 0.03, one that saw
+    # only z_t solved push in no episode.
     LEASH: float | tuple[float, float, float] = 0.03
     # m: half a metre fills the image; a 5 cm object is 8 pixels wide.
     CAMERA = ((0.56, 0.0, 0.145), 1.15)

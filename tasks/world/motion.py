@@ -66,7 +66,7 @@ def record_random(
 def random_takes(
     env: TaskEnv, frames: int, seed: int, take: int
 ) -> Iterator[tuple[np.ndarray, np.ndarray, Recording]]:
-    """Film `frames` frames of random motion in takes of `take` frames, the object put anew for
+    """Film `frames` frames of random motion in takes of `take` frames, the object placed anew for
     each. Yields what `film` returns, for each take."""
     rng = np.random.default_rng(seed)
     for start in range(0, frames, take):

@@ -2,7 +2,7 @@
 
 In: an environment, a seed and actions. Out: the film, and a `Recording` that makes the same film
 again, frame by frame. An npz file beside the films keeps the recordings: for replays, for those
-who learn from actions, and for export. The method of this kit sees the films alone.
+who learn from actions, and for export. The method of this kit sees only the films.
 """
 
 from __future__ import annotations
@@ -55,8 +55,8 @@ def film(
 def save_recordings(path: Path | str, recordings: Iterable[Recording]) -> None:
     """Write recordings as an npz file, the same bytes for the same recordings.
 
-    `seeds`, `scatter` and `lengths` have one entry an episode. `states`, `times` and `success` hold
-    the episodes one after the other, `lengths` rows each; `actions` likewise, one row fewer each.
+    `seeds`, `scatter` and `lengths` have one entry per episode. `states`, `times` and `success`
+    hold the episodes one after the other, `lengths` rows each; `actions` likewise, one row fewer.
     """
     seeds, scatter, actions, states, times, success = zip(*recordings, strict=True)
     data = io.BytesIO()
@@ -74,7 +74,7 @@ def save_recordings(path: Path | str, recordings: Iterable[Recording]) -> None:
 
 
 def load_recordings(path: Path | str) -> list[Recording]:
-    """What `save_recordings` wrote. Raises InputError if the file is missing or not complete."""
+    """What `save_recordings` wrote. Raises InputError if the file is missing or incomplete."""
     if not Path(path).is_file():
         raise InputError(f"{path}: there is no such file; python -m tasks record writes it.")
     try:

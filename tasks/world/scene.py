@@ -45,7 +45,7 @@ SUPERSAMPLE = 2
 DT = 1 / 250  # s, one simulation step
 SUBSTEPS = 10  # simulation steps per control step
 FPS = 25  # control steps and frames per second, as in Fetch: 1 / (DT * SUBSTEPS)
-TABLE_FRICTION = 1.0  # Bullet multiplies it with the object's own
+TABLE_FRICTION = 1.0  # Bullet multiplies it by the object's own
 # m, half the thickness of gripper and fingers: a tip that pushes a thing stands this far behind it.
 FINGER = 0.012
 
@@ -123,7 +123,7 @@ class World:
     def box(
         self, half: Vector, position: Vector, rgba: Colour, mass: float = 0.0, solid: bool = True
     ) -> int:
-        """Add a box of half extents `half`. Mass 0 (kg) stands still; not solid, it is not felt."""
+        """Add a box of half extents `half`. Mass 0 (kg) fixes it; if not solid, it is not felt."""
         return self._body(Part("box", half, position, rgba, mass, solid))
 
     def cylinder(
@@ -199,12 +199,12 @@ class World:
         return visual, p.createCollisionShape(kind, **touch) if part.solid else -1
 
     def _undamp(self, body):
-        # Bullet's default damping of 0.04 would brake a sliding object besides friction.
+        # Bullet's default damping of 0.04 would brake a sliding object on top of friction.
         for link in range(-1, self.p.getNumJoints(body)):
             self.p.changeDynamics(body, link, linearDamping=0, angularDamping=0, jointDamping=0)
 
     def take_apart(self) -> None:
-        """Put all that moves freely where nothing touches."""
+        """Put everything that moves freely where it touches nothing."""
         for i in range(self.p.getNumBodies()):
             body = self.p.getBodyUniqueId(i)
             if self.p.getDynamicsInfo(body, -1)[0] > 0:  # neither scenery nor an arm nor a rail

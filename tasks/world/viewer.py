@@ -225,9 +225,9 @@ class Recorder:
         return cv2.imencode(".png", rgb)[1].tobytes()
 
     def _repr_html_(self) -> str:
-        """In a notebook a recorder as a cell's value shows itself, in a frame of its own.
+        """In a notebook a recorder that is a cell's value shows itself, in a frame of its own.
 
-        Paper, and viewers that take scripts out, show a picture instead.
+        On paper, and in viewers that strip scripts, a picture stands in for it.
         """
         page = html.escape(self.html("scene"))
         scene = f'<iframe srcdoc="{page}" style="width: 100%; height: 420px; border: 0"></iframe>'
