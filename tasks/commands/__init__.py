@@ -1,4 +1,4 @@
-"""One file a command, each with its own arguments and help.
+"""One file per command, each with its own arguments and help.
 
 What they share is here: how arguments are read, and how a mistake becomes one sentence.
 """
@@ -103,7 +103,7 @@ def at_least(least: int) -> Callable[[str], int]:
 
 
 def make_folder(out: Path) -> None:
-    """Make the folder `out`. Raises InputError where that cannot be."""
+    """Make the folder `out`. Raises InputError where that is impossible."""
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:

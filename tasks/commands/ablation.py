@@ -54,7 +54,7 @@ def ablation(out: Path, jobs: int, episodes: int = TEST_EPISODES, seeds: int = S
 
 
 def bars(rows: dict[str, list[list[Row]]]) -> Figure:
-    """Success rates with their intervals, a group of bars a reward, a bar a task."""
+    """Success rates with their intervals, a group of bars per reward, a bar per task."""
     with rc_context(STYLE):
         figure = Figure(figsize=(7.2, 3.8))
         axis = figure.subplots()

@@ -1,4 +1,4 @@
-"""How fast is it? Steps, iterations and updates a second, beside the libraries people know.
+"""How fast is it? Steps, iterations and updates a second, compared with libraries people know.
 
 Every figure is for one core, and a median of rounds in which the contestants take turns: a machine
 that slows down slows all of them. Absolute figures depend on the machine, so read the ratios.
@@ -161,7 +161,7 @@ def our_updates(width: int) -> Contestant:
 
 
 class Noise(gym.Env):
-    """Observations that mean nothing: updates cost as much on them."""
+    """Observations that mean nothing: updates cost just as much on them."""
 
     observation_space = gym.spaces.Box(-np.inf, np.inf, (OBS_DIM,), np.float32)
     action_space = gym.spaces.Box(-1, 1, (ACTION_DIM,), np.float32)

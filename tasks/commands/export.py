@@ -1,4 +1,4 @@
-"""The experts' recordings as a dataset of Minari's, for those who learn from demonstrations.
+"""The experts' recordings as a Minari dataset, for those who learn from demonstrations.
 
 Each recording is played again, so that frames and rewards are the environment's own.
 """
@@ -63,7 +63,7 @@ def main(argv: list[str]) -> None:
             )
         )
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # it misses an author's e-mail address and a link
+        warnings.simplefilter("ignore")  # it wants an author's e-mail address and a link
         minari.create_dataset_from_buffers(
             dataset,
             episodes,

@@ -52,10 +52,10 @@ def main(argv: list[str]) -> None:
 
 
 def probe(name: str, perception: Perception, seed: int, frames: int = 400) -> dict[str, Any]:
-    """Figures of one task's perception, by frames filmed with seeds that no training uses.
+    """Figures of one task's perception, from frames filmed with seeds that no training uses.
 
     Returns R^2 per coordinate on robot and translated frames, each with the residual in pixels, and
-    the standard deviation of every keypoint. Where something is touched, also the way from tip to
+    the standard deviation of every keypoint. Where something is touched, also the gap from tip to
     object in pixels while the object moves, as the keypoints show it in the translated
     demonstration and in a robot expert's film: they agree if the translated gripper touches what it
     seems to push.
@@ -76,7 +76,7 @@ def probe(name: str, perception: Perception, seed: int, frames: int = 400) -> di
     }
     out: dict[str, Any] = {}
     for where, (z_fit, px_fit, z_held, px_held) in sets.items():
-        moves = px_held.std(0) > 0.5  # R^2 says nothing of what does not move
+        moves = px_held.std(0) > 0.5  # R^2 says nothing about what does not move
         fit = r2(z_fit, px_fit, z_held, px_held)
         error = pixel_error(z_fit, px_fit, z_held, px_held)
         out[where] = {
@@ -95,7 +95,7 @@ def probe(name: str, perception: Perception, seed: int, frames: int = 400) -> di
 
 
 def in_picture(film: np.ndarray, truth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """What shows tip and object: a puck may slide out of the picture."""
+    """The frames that show tip and object: a puck may slide out of the picture."""
     seen = ((truth > 0) & (truth < SIZE)).all(1)
     return film[seen], truth[seen]
 

@@ -1,6 +1,6 @@
 """Film the human videos of a task: fifteen of the expert, one of random motion.
 
-Beside the films go two files of what they do not show, `experts.npz` and `random.npz`: actions,
+Beside the films go two files with what they do not show, `experts.npz` and `random.npz`: actions,
 true states and times, from which the same films can be made again.
 """
 
@@ -16,7 +16,7 @@ from tasks.world import Recording, random_takes, record_expert, save_recordings
 from tasks.world.scene import FPS
 
 EXPERTS = 15  # videos of the task being done; the method learns from the first alone
-TRIES = 3 * EXPERTS  # a human films again when it went wrong, but not for ever
+TRIES = 3 * EXPERTS  # a human films again when it goes wrong, but not for ever
 
 
 def parser() -> Parser:

@@ -1,8 +1,8 @@
-"""Does a trained policy bear what its training never showed? A camera that moved, light, colour.
+"""Does a trained policy cope with what its training never showed? Camera moved, light, colour.
 
 In: trained weights. Out: success under each change, one change at a time, the same starts for all.
 The demonstration stays as it was filmed. A detector that follows the change does not save a policy:
-a camera that moved by a pixel moves every keypoint, and the demonstration's not.
+a camera that moved by a pixel moves every keypoint, but not the demonstration's.
 """
 
 from __future__ import annotations
@@ -109,7 +109,7 @@ def robustness(task: str, weights: Path, episodes: int, seed: int = 0) -> dict[s
 
 
 def paint(world: World, old: tuple[float, ...], new: tuple[float, ...]) -> int:
-    """Paint all that has one colour, red to blue say, in another; returns how many parts did."""
+    """Paint all of one colour in another, say red in blue; returns how many parts changed."""
     p, parts = world.p, 0
     for i in range(p.getNumBodies()):
         body = p.getBodyUniqueId(i)

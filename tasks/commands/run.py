@@ -27,7 +27,7 @@ from tasks.commands.probe import PROBE_SEED, probe
 from tasks.world import TaskEnv, record_random
 from tasks.world.viewer import mirror
 
-JITTER = 0.005  # m, start jitter, so that ten test episodes are ten episodes
+JITTER = 0.005  # m, start jitter, so that ten test episodes are ten different ones
 TEST_SEED = 1_000_000  # first seed of the test episodes, far from those of training
 
 
@@ -59,7 +59,7 @@ def perceive(job: Job) -> tuple[Perception, np.ndarray]:
             job.demo, job.random, robot, job.recipe,
             task=job.name, seed=seed, run=job.run, device=job.args.device or "cpu",
         )  # fmt: skip
-    # The probe films the simulated human, whom a perception of another video never saw.
+    # The probe films the simulated human, whom a perception trained on another video never saw.
     if job.from_scratch and job.args.video is None and "perception" not in job.run.metrics:
         perception.watch(job.demo)
         found = probe(job.name, perception, PROBE_SEED + seed)
@@ -70,7 +70,7 @@ def perceive(job: Job) -> tuple[Perception, np.ndarray]:
 
 def learn(job: Job, perception: Perception, robot: np.ndarray) -> tuple[sac.Policy, gym.Env]:
     """The policy, trained or replayed, and its environment."""
-    torch.set_num_threads(1)  # SAC's networks are small: a second thread costs more than it brings
+    torch.set_num_threads(1)  # SAC's networks are small: a second thread costs more than it gains
     if job.args.evaluate:
         shutil.copy(job.weights / "policy.safetensors", job.run.out / "policy.safetensors")
     agent, env = imitate(
@@ -144,7 +144,7 @@ def report(job: Job, perception: Perception, first: dict[str, Any], scene: str) 
         demo=job.demo,
         translated=perception.translated,
         z_demo=perception.z_E,
-        log=json.loads(log.read_text()) if log.exists() else [],  # a replayed policy brings none
+        log=json.loads(log.read_text()) if log.exists() else [],  # a replayed policy has none
         episode=first,
         metrics=metrics,
         scene_html=scene,
