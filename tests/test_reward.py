@@ -120,13 +120,14 @@ def test_arm_that_never_touches_the_object_scores_below_the_replay(toy):
     touchless[:, 3] = touchless[0, 3]
     share = np.linalg.norm(reward.z_E[-1, 3] - reward.z_E[0, 3]) / 4 / reward.path
     lost = share * (HORIZON - len(reward.z_E))
-    assert lost > 2
-    assert total(reward, touchless) < total(reward, replay(toy)) - lost
+    earned = total(reward, replay(toy))
+    assert lost > -0.3 * earned  # or the next line would say little
+    assert total(reward, touchless) < earned - lost
 
 
 def test_the_further_the_object_gets_the_more_it_earns(toy):
-    way = (-0.3, 0.3, 0.7, 0), (-0.26, 0.5, 0.7, 0)
-    scores = [total(mended(toy), acted(*way, (x, 0.5, 0.8, 0))) for x in (-0.2, 0.0, 0.2, 0.38)]
+    way = (-0.3, 0.3, 0.5, 0), (-0.26, 0.5, 0.5, 0)  # at about the demonstration's pace
+    scores = [total(mended(toy), acted(*way, (x, 0.5, 0.6, 0))) for x in (-0.2, 0.0, 0.2, 0.38)]
     assert scores == sorted(scores)
 
 
