@@ -215,11 +215,10 @@ def train(
     """Fit a Transporter on videos (T, 84, 84, 3) uint8: the translated ones and the robot's.
 
     Robot frames are targets too, so the detector learns on what it later runs on; the paper names
-    only translated targets. shift, hue: the detector sees its frames moved by up to so many pixels,
-    half of them with hues turned by up to so many degrees; solutions/results/README.md says what
-    that is worth. Returns the model and a log: step, loss, and each keypoint's standard
-    deviation (near 0: glued to the background). Raises InputError for frames of another shape or
-    type.
+    only translated targets. shift, hue, for experiments: the detector sees its frames moved by up
+    to so many pixels, and half of them with hues turned by up to so many degrees. Returns the model
+    and a log: step, loss, and each keypoint's standard deviation (near 0: glued to the background).
+    Raises InputError for frames of another shape or type.
     """
     for i, v in enumerate(videos):
         if v.ndim != 4 or v.shape[1:] != (84, 84, 3) or v.dtype != np.uint8 or len(v) < 2:
