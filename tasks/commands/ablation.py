@@ -37,7 +37,7 @@ def ablation(out: Path, jobs: int, episodes: int = TEST_EPISODES, seeds: int = S
     changes = ("", *MENDS, "literal")
     wanted = [(t, s, c) for c in changes for t in ABLATED for s in range(seeds)]
     run_missing(out, wanted, jobs, episodes)
-    runs = {(t, c): [read(out, t, s, c) for s in range(seeds)] for t, _, c in wanted}
+    runs = {(t, c): [read(out, t, s, c) for s in range(seeds)] for t in ABLATED for c in changes}
     names = {c: f"without {c}" for c in MENDS} | {"": "all mends", "literal": "literal Eq. 8-10"}
     text = table.markdown(
         ["reward", *(column for t in ABLATED for column in (t, "by seed"))],
