@@ -13,6 +13,7 @@ from typing import cast
 
 import gymnasium as gym
 import numpy as np
+import torch
 from gymnasium.wrappers import TransformObservation
 
 import tasks
@@ -91,6 +92,7 @@ def robustness(task: str, weights: Path, episodes: int, seed: int = 0) -> dict[s
 
     Raises InputError if weights are missing, damaged, or another task's.
     """
+    torch.set_num_threads(1)  # for single frames a second thread costs more than it brings
     perception = load_perception(weights, task)
     policy = sac.load(weights / "policy.safetensors")
     perception.watch(video.read(tasks.VIDEOS / task / "expert_01.mp4")[0])
