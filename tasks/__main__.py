@@ -17,13 +17,13 @@ from tasks.commands import COMMANDS
 def overview() -> str:
     """What there is: tasks, commands, and what to try first."""
     lines = ["A robot watches one human video and learns the skill.", "", "tasks:"]
-    lines += [f"  {name:9s} {tasks.sentence(name)}" for name in tasks.TASKS]
+    lines += [f"  {name:10s} {tasks.sentence(name)}" for name in tasks.TASKS]
     lines += [
         "",
         "commands:",
-        "  TASK      learn the task from its video; write runs/TASK/report.html",
+        "  TASK       learn the task from its video; write runs/TASK/report.html",
     ]
-    lines += [f"  {name:9s} {about}" for name, about in COMMANDS.items()]
+    lines += [f"  {name:10s} {about}" for name, about in COMMANDS.items()]
     lines += ["", "try first:"]
     for line, about in (
         ("push --evaluate", "the trained robot pushes: ten episodes and a report"),
