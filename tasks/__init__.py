@@ -12,6 +12,9 @@ import gymnasium as gym
 from lbw_minimal.training import InputError
 
 if TYPE_CHECKING:
+    import numpy as np
+
+    from lbw_minimal.imitate import Perception
     from tasks.world import TaskEnv
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -40,6 +43,29 @@ def bare(name: str, **options: Any) -> TaskEnv:
     return cast("TaskEnv", gym.make(id_of(name), **options).unwrapped)
 
 
+def trained_perception(name: str, weights: Path | None = None) -> Perception:
+    """Perception in the folder `weights`, or the shipped one, that has watched the human video.
+
+    Raises InputError if a file is missing, damaged, or another task's.
+    """
+    from lbw_minimal import imitate, video
+
+    perception = imitate.load_perception(weights or WEIGHTS / name, name)
+    perception.watch(video.read(VIDEOS / name / "expert_01.mp4")[0])
+    return perception
+
+
+def pace_film(name: str, seed: int = 0) -> np.ndarray:
+    """Random robot motion (T, 84, 84, 3) uint8, as much as shows the robot's pace."""
+    from lbw_minimal.imitate import PACE
+    from tasks.world import record_random
+
+    env = bare(name)
+    robot, _ = record_random(env, PACE, seed=seed)
+    env.close()
+    return robot
+
+
 def keypoint_env(name: str, reward: str | None = "mended", **options: Any) -> gym.Env:
     """Task `name` as the paper's agent sees it, for any agent that speaks Gymnasium.
 
@@ -50,20 +76,15 @@ def keypoint_env(name: str, reward: str | None = "mended", **options: Any) -> gy
     seconds, because the robot is filmed to learn its pace. Raises InputError for an unknown task or
     reward.
     """
-    from lbw_minimal import imitate, video, wrappers
-    from tasks.world import record_random
+    from lbw_minimal import imitate, wrappers
 
     if name not in TASKS:
         raise InputError(f"{name}: there is no such task; choose one of {', '.join(TASKS)}.")
-    perception = imitate.load_perception(WEIGHTS / name, name)
     env = gym.make(id_of(name), **options)
     if reward is None:
+        perception = imitate.load_perception(WEIGHTS / name, name)
         return wrappers.KeypointObservation(env, perception.detect)
-    perception.watch(video.read(VIDEOS / name / "expert_01.mp4")[0])
-    film_env = bare(name)
-    robot, _ = record_random(film_env, imitate.PACE, seed=0)
-    film_env.close()
-    return imitate.watched(env, perception, robot, reward)[0]
+    return imitate.watched(env, trained_perception(name), pace_film(name), reward)[0]
 
 
 for _name in TASKS:

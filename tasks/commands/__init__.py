@@ -71,6 +71,12 @@ class Parser(argparse.ArgumentParser):
         names = ", ".join(tasks.TASKS)
         self.add_argument("task", type=task, metavar="TASK", help=f"one of {names}")
 
+    def add_weights(self) -> None:
+        """A folder of trained weights as an option."""
+        self.add_argument(
+            "--weights", type=Path, metavar="DIR", help="trained weights (those of the kit)"
+        )
+
 
 def parsers() -> list[Parser]:
     """The parser of every command."""

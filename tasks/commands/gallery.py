@@ -16,13 +16,13 @@ import numpy as np
 
 import tasks
 from lbw_minimal import sac, video
-from lbw_minimal.imitate import PACE, load_perception, watched
+from lbw_minimal.imitate import watched
 from lbw_minimal.pictures import data_uri, draw_keypoints, film, picture
 from lbw_minimal.report import CSS, demonstration
 from lbw_minimal.training import write_atomic
 from tasks.commands import Parser, make_folder
 from tasks.commands.viewer import perform
-from tasks.world import TaskEnv, record_random
+from tasks.world import TaskEnv
 from tasks.world.scene import FPS
 from tasks.world.viewer import mirror
 
@@ -78,9 +78,7 @@ def write(out: Path) -> Path:
 def section(name: str, out: Path) -> str:
     """One task's part of the page; its scenes go to files beside it."""
     demo, _ = video.read(tasks.VIDEOS / name / "expert_01.mp4")
-    perception = load_perception(tasks.WEIGHTS / name, name)
-    perception.watch(demo)
-    robot, _ = record_random(tasks.bare(name), PACE, seed=0)
+    perception, robot = tasks.trained_perception(name), tasks.pace_film(name)
     agent = sac.load(tasks.WEIGHTS / name / "policy.safetensors")
     env, _ = watched(gym.make(tasks.id_of(name)), perception, robot)
     frames, z, won = rollout(env, agent, out / f"{name}-robot.html")

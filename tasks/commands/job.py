@@ -50,7 +50,7 @@ def parser(name: str) -> Parser:
     add("--without", choices=MENDS, help="leave one mend of the reward out")
     add("--set", action="append", default=[], metavar="NAME=VALUE", help="a field of the recipe")
     add("--evaluate", action="store_true", help="only replay a trained policy")
-    add("--weights", type=Path, metavar="DIR", help="trained weights (those of the kit)")
+    p.add_weights()
     add("--episodes", type=at_least(1), default=None, help=f"test episodes ({TEST_EPISODES})")
     add("--seed", type=at_least(0), default=0)
     add("--device", help="where perception learns: cpu (the default) or cuda")

@@ -8,14 +8,12 @@ saw. The truth goes into these figures and nowhere else.
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import tasks
-from lbw_minimal import video
-from lbw_minimal.imitate import Perception, load_perception
+from lbw_minimal.imitate import Perception
 from lbw_minimal.report import score
 from lbw_minimal.transporter import pixel_error, r2
 from tasks.commands import Parser, at_least
@@ -30,7 +28,7 @@ def parser() -> Parser:
     """The arguments of `probe`."""
     p = Parser("probe", "Measure how well the keypoints of a task tell where things are.")
     p.add_task()
-    p.add_argument("--weights", type=Path, metavar="DIR", help="trained weights (those of the kit)")
+    p.add_weights()
     p.add_argument("--frames", type=at_least(100), default=400, help="frames to measure on")
     p.add_argument("--seed", type=at_least(0), default=0, help="of those frames")
     return p
@@ -39,8 +37,7 @@ def parser() -> Parser:
 def main(argv: list[str]) -> None:
     """Print the figures. Raises InputError for a mistake in the arguments or the weights."""
     args = parser().read(argv)
-    perception = load_perception(args.weights or tasks.WEIGHTS / args.task, args.task)
-    perception.watch(video.read(tasks.VIDEOS / args.task / "expert_01.mp4")[0])
+    perception = tasks.trained_perception(args.task, args.weights)
     found = probe(args.task, perception, PROBE_SEED + args.seed, args.frames)
     print(f"{args.task}: R² of a linear map to the true pixels (error in pixels)")
     print(f"{'':10s}" + "".join(f"{name:>16s}" for name in SETS))

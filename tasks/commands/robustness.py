@@ -17,13 +17,13 @@ import torch
 from gymnasium.wrappers import TransformObservation
 
 import tasks
-from lbw_minimal import sac, video
-from lbw_minimal.imitate import PACE, load_perception, watched
+from lbw_minimal import sac
+from lbw_minimal.imitate import watched
 from lbw_minimal.report import wilson
 from tasks.commands import Parser, at_least
 from tasks.commands.run import JITTER, evaluate
 from tasks.commands.table import markdown
-from tasks.world import RED, TaskEnv, World, record_random
+from tasks.world import RED, TaskEnv, World
 
 BLUE = (0.10, 0.12, 0.78, 1)
 Change = Callable[[np.ndarray], np.ndarray]  # of a frame (84, 84, 3) uint8
@@ -67,7 +67,7 @@ def parser() -> Parser:
     """The arguments of `robustness`."""
     p = Parser("robustness", "Test a trained policy under a moved camera, other light and colour.")
     p.add_task()
-    p.add_argument("--weights", type=Path, metavar="DIR", help="trained weights (those of the kit)")
+    p.add_weights()
     p.add_argument("--episodes", type=at_least(1), default=20, help="test episodes for each change")
     p.add_argument("--seed", type=at_least(0), default=0, help="that the weights were trained with")
     return p
@@ -93,15 +93,15 @@ def robustness(task: str, weights: Path, episodes: int, seed: int = 0) -> dict[s
     Raises InputError if weights are missing, damaged, or another task's.
     """
     torch.set_num_threads(1)  # for single frames a second thread costs more than it brings
-    perception = load_perception(weights, task)
+    perception = tasks.trained_perception(task, weights)
     policy = sac.load(weights / "policy.safetensors")
-    perception.watch(video.read(tasks.VIDEOS / task / "expert_01.mp4")[0])
-    robot, _ = record_random(tasks.bare(task), PACE, seed=seed)
+    robot = tasks.pace_film(task, seed)
     wins = {}
     for name, change in CHANGES.items():
         env: gym.Env = gym.make(tasks.id_of(task), jitter=JITTER)
         world = cast(TaskEnv, env.unwrapped).world
         if name == "object blue" and not paint(world, RED, BLUE):
+            env.close()
             continue
         env, _ = watched(TransformObservation(env, change, None), perception, robot)
         rows, *_ = evaluate(policy, env, episodes)
