@@ -27,7 +27,6 @@ FRICTION = 0.4  # of gripper and hand: rougher ones stick to a pushed object and
 # tip's acceleration: with 10 instead of 40 1/s^2 slide's elbow swings up when actions alternate.
 POSTURE = 1 / 40
 YIELD = 0.003  # m out of its box, where a tip gives way; in free motion it is 1.1 mm at most
-CAP = 0.99  # of the fastest joint's speed limit: Bullet cuts all joints' speeds there
 EXACT = 1e-7  # m and rad, close enough for a reset; Bullet's poses are exact to 4e-8
 
 
@@ -75,8 +74,6 @@ class Arm:
             client.changeDynamics(
                 self.body, link,
                 linearDamping=0, angularDamping=0, jointDamping=0, lateralFriction=FRICTION,
-                # A knock on the tip spins the light wrist faster than torques can slow it down.
-                maxJointVelocity=CAP * self.speed.max(),
             )  # fmt: skip
             if name not in self.spec.reach_links:
                 client.setCollisionFilterGroupMask(self.body, link, 0, 0)
@@ -179,3 +176,14 @@ class Arm:
         self.p.setJointMotorControlArray(
             self.body, self.joints, self.p.TORQUE_CONTROL, forces=tau.tolist()
         )
+
+    def brake(self) -> None:
+        """Hold the joints to their speed limits, after a simulation step.
+
+        Only contact breaks them, when a knock on the tip or a hard press spins the light wrist: its
+        torque is too weak to slow it down in time.
+        """
+        q, dq = self.state()
+        for i in np.flatnonzero(np.abs(dq) > self.speed):
+            speed = np.copysign(self.speed[i], dq[i])
+            self.p.resetJointState(self.body, self.joints[i], q[i], speed)

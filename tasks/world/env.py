@@ -222,6 +222,7 @@ class TaskEnv(gym.Env, EzPickle):
         for _ in range(SUBSTEPS):
             self.arm.actuate()
             self.world.p.stepSimulation()
+            self.arm.brake()
 
     def render(self) -> np.ndarray | None:
         self._check_open("render")
