@@ -6,6 +6,7 @@ What they share is here: how arguments are read, and how a mistake becomes one s
 from __future__ import annotations
 
 import argparse
+import math
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
@@ -13,6 +14,7 @@ from typing import NoReturn
 
 import tasks
 from lbw_minimal.training import InputError
+from tasks.world.env import MOST_JITTER
 
 COMMANDS = {  # each a file in this folder
     "record": "film the human videos of a task again",
@@ -22,9 +24,12 @@ COMMANDS = {  # each a file in this folder
     "gallery": "one page with every task's scene, demonstration and rollout",
     "viewer": "a task's scene as a page that turns with the mouse",
     "probe": "how well the keypoints tell where things are",
+    "controls": "the policy beside robots that see little or nothing",
     "robustness": "success under a moved camera, other light and colour",
     "bench": "steps, iterations and updates a second on this machine",
 }
+
+JITTER = 0.005  # m, start jitter, so that ten test episodes are ten different ones
 
 
 class Parser(argparse.ArgumentParser):
@@ -71,6 +76,12 @@ class Parser(argparse.ArgumentParser):
         names = ", ".join(tasks.TASKS)
         self.add_argument("task", type=task, metavar="TASK", help=f"one of {names}")
 
+    def add_jitter(self) -> None:
+        """How far starts are moved, as an option."""
+        self.add_argument(
+            "--jitter", type=metres, default=JITTER, metavar="M", help="start jitter in metres"
+        )
+
     def add_weights(self) -> None:
         """A folder of trained weights as an option."""
         self.add_argument(
@@ -106,6 +117,17 @@ def at_least(least: int) -> Callable[[str], int]:
         return value
 
     return number
+
+
+def metres(text: str) -> float:
+    """A type for argparse: how far a start may be moved, in m."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0 <= value <= MOST_JITTER:
+        raise argparse.ArgumentTypeError(f"{text!r} is no length from 0 to {MOST_JITTER} m")
+    return value
 
 
 def make_folder(out: Path) -> None:

@@ -51,6 +51,7 @@ def parser(name: str) -> Parser:
     add("--set", action="append", default=[], metavar="NAME=VALUE", help="a field of the recipe")
     add("--evaluate", action="store_true", help="only replay a trained policy")
     p.add_weights()
+    p.add_jitter()
     add("--episodes", type=at_least(1), default=None, help=f"test episodes ({TEST_EPISODES})")
     add("--seed", type=at_least(0), default=0)
     add("--device", help="where perception learns: cpu (the default) or cuda")
@@ -103,6 +104,7 @@ def check(name: str, args: argparse.Namespace, argv: list[str]) -> Job:
         "without": args.without,
         "fast": args.fast,
         "from_scratch": from_scratch,
+        "jitter": args.jitter,
         "video": hashlib.sha256(demo.tobytes()).hexdigest()[:16],
         "set": sorted(args.set),
         "recipe": dataclasses.asdict(recipe),

@@ -20,8 +20,8 @@ import tasks
 from lbw_minimal import sac
 from lbw_minimal.imitate import watched
 from lbw_minimal.report import wilson
-from tasks.commands import Parser, at_least
-from tasks.commands.run import JITTER, evaluate
+from tasks.commands import JITTER, Parser, at_least
+from tasks.commands.run import evaluate
 from tasks.commands.table import markdown
 from tasks.world import RED, TaskEnv, World
 

@@ -27,7 +27,6 @@ from tasks.commands.probe import PROBE_SEED, probe
 from tasks.world import TaskEnv, record_random
 from tasks.world.viewer import mirror
 
-JITTER = 0.005  # m, start jitter, so that ten test episodes are ten different ones
 TEST_SEED = 1_000_000  # first seed of the test episodes, far from those of training
 
 
@@ -74,7 +73,7 @@ def learn(job: Job, perception: Perception, robot: np.ndarray) -> tuple[sac.Poli
     if job.args.evaluate:
         shutil.copy(job.weights / "policy.safetensors", job.run.out / "policy.safetensors")
     agent, env = imitate(
-        gym.make(tasks.id_of(job.name), jitter=JITTER), job.demo, robot, perception, job.recipe,
+        gym.make(tasks.id_of(job.name), jitter=job.args.jitter), job.demo, robot, perception, job.recipe,
         seed=job.args.seed, run=job.run, form=job.args.reward, without=job.args.without,
     )  # fmt: skip
     sees, given = agent.sizes["obs_dim"], cast(Box, env.observation_space).shape[0]

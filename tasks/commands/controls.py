@@ -1,0 +1,201 @@
+"""Does a task need eyes? The trained policy beside robots that see little, or nothing, or only once.
+
+In: trained weights. Out: success over start jitter, the same starts for all. What a blind robot does
+is chosen among many by the simulator's own verdict, on other starts than those of the test: it is
+flattered, and a policy that is no better than it has not been shown to look.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import gymnasium as gym
+import numpy as np
+import torch
+from gymnasium.wrappers import TimeLimit
+
+import tasks
+from lbw_minimal import sac
+from lbw_minimal.imitate import watched
+from lbw_minimal.report import wilson
+from lbw_minimal.training import write_atomic
+from tasks.commands import JITTER, Parser, at_least, make_folder
+from tasks.commands.run import TEST_SEED
+from tasks.commands.table import markdown
+
+JITTERS = (JITTER, 0.01, 0.02, 0.04)  # m
+TRIAL_SEED, TRIALS = 2_000_000, 10  # starts on which blind robots are chosen
+LIBRARY = 50  # episodes of the policy, from which the robot that looks once takes one
+Robot = Callable[[np.ndarray, int], np.ndarray]  # (observation, step of the episode) -> action
+
+
+class Frozen(gym.ObservationWrapper):
+    """A camera that shows an episode's first frame for ever."""
+
+    def reset(self, **options):
+        """As Gymnasium's; the camera takes its one picture."""
+        self.first, info = self.env.reset(**options)
+        return self.first, info
+
+    def observation(self, observation: np.ndarray) -> np.ndarray:
+        """The first frame (84, 84, 3) uint8, whatever there is to see."""
+        return self.first
+
+
+class Grey(gym.ObservationWrapper):
+    """A camera that shows nothing."""
+
+    def observation(self, observation: np.ndarray) -> np.ndarray:
+        """A grey frame (84, 84, 3) uint8."""
+        return np.full_like(observation, 128)
+
+
+def replay(actions: np.ndarray) -> Robot:
+    """Play actions (T, 3) again with closed eyes, and then rest."""
+    return lambda obs, t: actions[t] if t < len(actions) else np.zeros(3, np.float32)
+
+
+def constant(action: tuple[float, ...]) -> Robot:
+    """The same action (3,) at every step."""
+    return lambda obs, t: np.array(action, np.float32)
+
+
+def down_then_along(steps: int) -> Robot:
+    """So many steps down, and then along x."""
+    down, along = np.array([[0, 0, -1], [1, 0, 0]], np.float32)
+    return lambda obs, t: down if t < steps else along
+
+
+def noise(seed: int = 0) -> Robot:
+    """Uniformly random actions."""
+    rng = np.random.default_rng(seed)
+    return lambda obs, t: rng.uniform(-1, 1, 3).astype(np.float32)
+
+
+def look_once(starts: np.ndarray, takes: list[np.ndarray]) -> Robot:
+    """Look at the first frame, replay the take whose start looked most alike, see no more.
+
+    starts (n, S): first observations of n episodes; takes: their actions (T, 3).
+    """
+    chosen = 0
+
+    def act(obs, t):
+        nonlocal chosen
+        if t == 0:
+            chosen = int(np.linalg.norm(starts - obs, axis=1).argmin())
+        return replay(takes[chosen])(obs, t)
+
+    return act
+
+
+def play(
+    env: gym.Env, robot: Robot, seed: int, whole: bool = True
+) -> tuple[bool, float, np.ndarray, np.ndarray]:
+    """An episode: whether the task was done, the return, the first observation, the actions.
+
+    whole: go on to its end even if the task is done before.
+    """
+    first, _ = env.reset(seed=seed)
+    obs, actions, total, done, ended = first, [], 0.0, False, False
+    while not ended:
+        actions.append(robot(obs, len(actions)))
+        obs, reward, terminated, truncated, info = env.step(actions[-1])
+        total, done = total + float(reward), done or info["is_success"]
+        ended = terminated or truncated or (done and not whole)
+    return done, total, first, np.stack(actions)
+
+
+def wins(env: gym.Env, robot: Robot, episodes: int, seed: int = TEST_SEED) -> int:
+    """Successful episodes, from the starts that follow `seed`."""
+    return sum(play(env, robot, seed + i, whole=False)[0] for i in range(episodes))
+
+
+def best(env: gym.Env, robots: list[Robot]) -> Robot:
+    """The robot that succeeds most often on the trial starts."""
+    return max(robots, key=lambda robot: wins(env, robot, TRIALS, TRIAL_SEED))
+
+
+def compare(task: str, weights: Path, jitter: float, episodes: int, seed: int) -> dict[str, int]:
+    """Successes of the policy in `weights` and of every control, with starts moved by `jitter` (m).
+
+    seed: that of the training, whose film of the robot set the demonstration's pace. Raises
+    InputError if weights are missing, damaged, or another task's.
+    """
+    perception = tasks.trained_perception(task, weights)
+    policy = sac.load(weights / "policy.safetensors")
+    film = tasks.pace_film(task, seed)
+
+    def seen_through(camera=None):
+        env: gym.Env = gym.make(tasks.id_of(task), jitter=jitter)
+        return watched(camera(env) if camera else env, perception, film)
+
+    def trained(obs, t):
+        return policy.act(obs, deterministic=True)
+
+    env, reward = seen_through()
+    found = {"the policy": wins(env, trained, episodes)}
+    for name, camera in (("its camera frozen", Frozen), ("its camera grey", Grey)):
+        blinded = seen_through(camera)[0]
+        found[name] = wins(blinded, trained, episodes)
+        blinded.close()
+    own = [play(env, trained, TRIAL_SEED + i) for i in range(LIBRARY)]
+    done = [episode for episode in own if episode[0]] or own
+    looks = look_once(np.stack([first for _, _, first, _ in done]), [a for *_, a in done])
+    found["looks once, then replays"] = wins(env, looks, episodes)
+    env.close()
+
+    blind = TimeLimit(gym.make(tasks.id_of(task), jitter=jitter, observation="state"), reward.episode)
+    _, _, _, actions = max(done, key=lambda episode: episode[1])
+    directions = [d for d in itertools.product((-1, 0, 1), repeat=3) if d[1] == 0 and any(d)]
+    found |= {
+        "blind replay of its best episode": wins(blind, replay(actions), episodes),
+        "best constant action": wins(blind, best(blind, [*map(constant, directions)]), episodes),
+        "down, then along": wins(
+            blind, best(blind, [down_then_along(n) for n in range(3, 25, 3)]), episodes
+        ),
+        "random actions": wins(blind, noise(), episodes),
+        "idle": wins(blind, constant((0, 0, 0)), episodes),
+    }
+    blind.close()
+    return found
+
+
+def parser() -> Parser:
+    """The arguments of `controls`."""
+    p = Parser("controls", "Test a trained policy beside robots that see little or nothing.")
+    p.add_task()
+    p.add_weights()
+    p.add_argument("--episodes", type=at_least(1), default=100, help="test episodes for each")
+    p.add_argument("--seed", type=at_least(0), default=0, help="that the weights were trained with")
+    p.add_argument("--out", type=Path, metavar="DIR", help="folder of the table (runs/controls)")
+    return p
+
+
+def main(argv: list[str]) -> None:
+    """Print the table and write it. Raises InputError for a mistake in the arguments."""
+    args = parser().read(argv)
+    torch.set_num_threads(1)  # for single frames a second thread costs more than it brings
+    out = args.out or Path("runs/controls")
+    weights = args.weights or tasks.WEIGHTS / args.task
+    make_folder(out)
+    path = out / f"{args.task}.json"
+    found = {str(j): compare(args.task, weights, j, args.episodes, args.seed) for j in JITTERS}
+    note = {"task": args.task, "episodes": args.episodes, "seed": args.seed, "success": found}
+    write_atomic(path, json.dumps(note, indent=1) + "\n")
+    print(table(note), end="")
+
+
+def table(note: dict) -> str:
+    """What `main` wrote, as Markdown: a row a robot, a column a jitter, with 95 % intervals."""
+    success, n = note["success"], note["episodes"]
+
+    def cell(jitter, robot):
+        low, high = wilson(success[jitter][robot], n)
+        return f"{success[jitter][robot]}/{n} ({100 * low:.0f}-{100 * high:.0f} %)"
+
+    head = [note["task"], *(f"{1000 * float(jitter):g} mm" for jitter in success)]
+    robots = next(iter(success.values()))
+    return markdown(head, [[robot, *(cell(j, robot) for j in success)] for robot in robots])
