@@ -12,7 +12,8 @@ from lbw_minimal import video
 from lbw_minimal.training import InputError
 from tasks import TASKS, VIDEOS, WEIGHTS, bare, commands
 from tasks.__main__ import main
-from tasks.commands import robustness
+from tasks.commands import robustness, run
+from tasks.commands.job import check, parser
 from tasks.world import RED, Recording
 
 
@@ -124,6 +125,10 @@ def no_seed(folder):
     return ["push", "--seed", "-1"], "'-1'"
 
 
+def starts_off_the_table(folder):
+    return ["push", "--jitter", "1"], "'1'"
+
+
 def no_such_field(folder):
     return ["push", "--set", "steps=3"], "policy_steps"
 
@@ -156,6 +161,7 @@ MISTAKES = (missing, text, truncated, no_frames, one_frame, tiny, still, unknown
             unknown_task_to_film, no_task_to_film, nothing_to_resume, other_tasks_weights,
             cut_weights, no_weights, no_cuda, no_such_device, literal_without_a_mend, no_episodes,
             another_commands_option, an_option_that_is_none, one_argument_too_many, no_seed,
+            starts_off_the_table,
             no_such_field, no_such_value, a_value_that_is_no_number,
             a_field_of_perception_that_is_not_trained, replaying_and_learning,
             weights_beside_training,
@@ -242,7 +248,8 @@ def test_every_option_is_a_commands_own_or_refused_with_the_name_of_its_command(
     needed = ["push"] if any(a.dest == "task" for a in parser._actions) else []
     if option in parser.options():
         action = parser._option_string_actions[option]
-        value = {"--set": "K=3", "--reward": "literal", "--without": "trim"}.get(option, "200")
+        values = {"--set": "K=3", "--reward": "literal", "--without": "trim", "--jitter": "0.02"}
+        value = values.get(option, "200")
         value = action.choices[-1] if action.choices else value
         args = parser.read([*needed, option] + [value] * (action.nargs != 0))
         assert getattr(args, action.dest) != action.default
@@ -271,6 +278,13 @@ def test_the_recipe_is_set_and_the_report_says_so(tmp_path):
     assert metrics["settings"]["recipe"]["entropy"] == -2.5
     assert json.loads((tmp_path / "policy_log.json").read_text())[-1]["step"] < 200
     assert field in (tmp_path / "report.html").read_text()
+
+
+def test_starts_are_moved_as_far_as_asked(tmp_path):
+    arguments = ["reach", "--evaluate", "--jitter", "0.03", "--out", str(tmp_path)]
+    job = check("reach", parser("reach").read(arguments[1:]), arguments[1:])
+    _, env = run.learn(job, *run.perceive(job))
+    assert env.unwrapped.jitter == job.run.metrics["settings"]["jitter"] == 0.03
 
 
 def test_a_policy_of_the_other_reward_is_refused(tmp_path, capfd):

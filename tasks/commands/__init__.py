@@ -76,12 +76,6 @@ class Parser(argparse.ArgumentParser):
         names = ", ".join(tasks.TASKS)
         self.add_argument("task", type=task, metavar="TASK", help=f"one of {names}")
 
-    def add_jitter(self) -> None:
-        """How far starts are moved, as an option."""
-        self.add_argument(
-            "--jitter", type=metres, default=JITTER, metavar="M", help="start jitter in metres"
-        )
-
     def add_weights(self) -> None:
         """A folder of trained weights as an option."""
         self.add_argument(

@@ -1,8 +1,8 @@
-"""Does a task need eyes? The trained policy beside robots that see little, or nothing, or only once.
+"""Does a task need eyes? The trained policy beside robots that see little, nothing, or only once.
 
-In: trained weights. Out: success over start jitter, the same starts for all. What a blind robot does
-is chosen among many by the simulator's own verdict, on other starts than those of the test: it is
-flattered, and a policy that is no better than it has not been shown to look.
+In: trained weights. Out: success over start jitter, the same starts for all. What a blind robot
+does is chosen among many by the simulator's own verdict, on other starts than those of the test:
+it is flattered, and a policy that is no better than it has not been shown to look.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import itertools
 import json
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -35,7 +36,7 @@ Robot = Callable[[np.ndarray, int], np.ndarray]  # (observation, step of the epi
 class Frozen(gym.ObservationWrapper):
     """A camera that shows an episode's first frame for ever."""
 
-    def reset(self, **options):
+    def reset(self, **options: Any) -> tuple[np.ndarray, dict]:
         """As Gymnasium's; the camera takes its one picture."""
         self.first, info = self.env.reset(**options)
         return self.first, info
@@ -147,7 +148,8 @@ def compare(task: str, weights: Path, jitter: float, episodes: int, seed: int) -
     found["looks once, then replays"] = wins(env, looks, episodes)
     env.close()
 
-    blind = TimeLimit(gym.make(tasks.id_of(task), jitter=jitter, observation="state"), reward.episode)
+    blind = gym.make(tasks.id_of(task), jitter=jitter, observation="state")
+    blind = TimeLimit(blind, reward.episode)  # whose true state no blind robot reads
     _, _, _, actions = max(done, key=lambda episode: episode[1])
     directions = [d for d in itertools.product((-1, 0, 1), repeat=3) if d[1] == 0 and any(d)]
     found |= {

@@ -23,7 +23,7 @@ from lbw_minimal import sac, video
 from lbw_minimal.imitate import Perception, Recipe, Run, load_perception
 from lbw_minimal.reward import MENDS
 from lbw_minimal.training import InputError, pick_device, write_atomic
-from tasks.commands import Parser, at_least, make_folder
+from tasks.commands import JITTER, Parser, at_least, make_folder, metres
 
 TEST_EPISODES = 10  # as in the paper
 RESULTS = ("*.checkpoint", "*.safetensors", "*_log.json", "metrics.json", "report.html")
@@ -51,7 +51,7 @@ def parser(name: str) -> Parser:
     add("--set", action="append", default=[], metavar="NAME=VALUE", help="a field of the recipe")
     add("--evaluate", action="store_true", help="only replay a trained policy")
     p.add_weights()
-    p.add_jitter()
+    add("--jitter", type=metres, default=JITTER, metavar="M", help="how far starts are moved")
     add("--episodes", type=at_least(1), default=None, help=f"test episodes ({TEST_EPISODES})")
     add("--seed", type=at_least(0), default=0)
     add("--device", help="where perception learns: cpu (the default) or cuda")

@@ -73,7 +73,8 @@ def learn(job: Job, perception: Perception, robot: np.ndarray) -> tuple[sac.Poli
     if job.args.evaluate:
         shutil.copy(job.weights / "policy.safetensors", job.run.out / "policy.safetensors")
     agent, env = imitate(
-        gym.make(tasks.id_of(job.name), jitter=job.args.jitter), job.demo, robot, perception, job.recipe,
+        gym.make(tasks.id_of(job.name), jitter=job.args.jitter),
+        job.demo, robot, perception, job.recipe,
         seed=job.args.seed, run=job.run, form=job.args.reward, without=job.args.without,
     )  # fmt: skip
     sees, given = agent.sizes["obs_dim"], cast(Box, env.observation_space).shape[0]

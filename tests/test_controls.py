@@ -1,0 +1,112 @@
+"""The controls: robots that see little or nothing, and what they can and cannot do."""
+
+import json
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import tasks
+from tasks.commands import JITTER, controls
+from tasks.commands.run import TEST_SEED
+
+
+class Sides(gym.Env):
+    """A flag is up on one side, +1 or -1: done after two steps to that side. It blinks off."""
+
+    observation_space = gym.spaces.Box(-1, 1, (2,), np.float32)
+    action_space = gym.spaces.Box(-1, 1, (3,), np.float32)
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self.side, self.x, self.t = self.np_random.choice([-1, 1]), 0, 0
+        return np.array([self.side, 0], np.float32), {}
+
+    def step(self, action):
+        self.x, self.t = self.x + np.sign(action[0]) * self.side, self.t + 1
+        obs = np.array([0, self.t / 4], np.float32)
+        return obs, float(self.x), False, self.t == 4, {"is_success": bool(self.x >= 2)}
+
+
+def side(obs, t):
+    """The robot that looks at the flag and remembers."""
+    side.of = obs[0] if t == 0 else side.of
+    return np.array([side.of, 0, 0], np.float32)
+
+
+def test_who_looks_wins_and_who_does_not_wins_half():
+    env = Sides()
+    sides = [np.sign(env.reset(seed=TEST_SEED + i)[0][0]) for i in range(40)]
+    assert controls.wins(env, side, 40) == 40
+    assert controls.wins(env, controls.constant((1, 0, 0)), 40) == sides.count(1)
+    assert controls.wins(env, controls.constant((0, 0, 0)), 40) == 0
+
+
+def test_one_look_is_enough_where_the_start_tells_all():
+    env = Sides()
+    own = [controls.play(env, side, i) for i in range(10)]
+    firsts, takes = np.stack([o[2] for o in own]), [o[3] for o in own]
+    assert set(firsts[:, 0]) == {-1, 1}
+    assert controls.wins(env, controls.look_once(firsts, takes), 40) == 40
+    assert controls.wins(env, controls.replay(takes[0]), 40) not in (0, 40)
+
+
+def test_an_episode_is_played_whole_or_to_its_success():
+    env = Sides()
+    done, total, first, actions = controls.play(env, side, seed=0)
+    assert done and total == 1 + 2 + 3 + 4 and actions.shape == (4, 3) and first.shape == (2,)
+    assert len(controls.play(env, side, seed=0, whole=False)[3]) == 2
+
+
+def test_a_success_that_is_lost_again_counts():
+    back = controls.replay(np.array([[1, 0, 0], [1, 0, 0], [-1, 0, 0], [-1, 0, 0]], np.float32))
+    done = [controls.play(Sides(), back, seed)[0] for seed in range(10)]
+    assert any(done) and not all(done)
+
+
+def test_the_best_robot_is_chosen_on_other_starts_than_the_tests(monkeypatch):
+    seeds = []
+    monkeypatch.setattr(
+        controls, "play", lambda env, robot, seed, whole: (seeds.append(seed) or robot(0, 0) > 0, 0)
+    )
+    good, bad = (lambda obs, t: 1), (lambda obs, t: -1)
+    assert controls.best(Sides(), [bad, good, bad]) is good
+    assert len(set(seeds)) == controls.TRIALS and min(seeds) >= TEST_SEED + 100_000
+
+
+def test_robots_without_eyes_do_what_their_names_say():
+    down = controls.down_then_along(2)
+    assert [down(None, t).tolist() for t in (0, 1, 2, 9)] == [[0, 0, -1]] * 2 + [[1, 0, 0]] * 2
+    again = controls.replay(np.ones((2, 3), np.float32))
+    assert [again(None, t).sum() for t in range(4)] == [3, 3, 0, 0]
+    random = controls.noise()
+    many = np.stack([random(None, t) for t in range(200)])
+    assert np.abs(many).max() <= 1 and np.abs(many.mean(0)).max() < 0.2
+
+
+def test_the_blinded_cameras_show_no_news():
+    frozen, grey = (c(gym.make(tasks.id_of("reach"))) for c in (controls.Frozen, controls.Grey))
+    first, _ = frozen.reset(seed=0)
+    later, *_ = frozen.step(np.ones(3, np.float32))
+    np.testing.assert_array_equal(later, first)
+    assert (frozen.unwrapped.render_mode is None) and first.std() > 0
+    other, _ = frozen.reset(seed=1, options={"scatter": True})
+    assert (other != first).any()  # an episode has its own first frame
+    assert {int(v) for v in grey.reset(seed=0)[0].flat} == {128}
+    frozen.close(), grey.close()
+
+
+@pytest.fixture
+def brief(monkeypatch):
+    """Fewer trials, fewer takes: what is compared stays the same."""
+    for name, value in {"LIBRARY": 2, "TRIALS": 1, "JITTERS": (JITTER,)}.items():
+        monkeypatch.setattr(controls, name, value)
+
+
+def test_the_shipped_policy_reaches_and_idle_and_grey_do_not(brief, tmp_path, capsys):
+    controls.main(["reach", "--episodes", "2", "--out", str(tmp_path)])
+    found = json.loads((tmp_path / "reach.json").read_text())["success"][str(JITTER)]
+    assert found["the policy"] == 2 and found["idle"] == 0
+    assert len(found) == 9
+    shown = capsys.readouterr().out
+    assert "| reach | 5 mm |" in shown and "| the policy | 2/2 (34-100 %) |" in shown
