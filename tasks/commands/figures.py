@@ -1,0 +1,142 @@
+"""The paper's figures, made of frames and results of this kit.
+
+In: frames (T, 84, 84, 3) uint8, keypoints z (T, K, 2) in [-1, 1], results. Out: Matplotlib figures.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from lbw_minimal.pictures import COLOURS, STYLE, draw_keypoints, enlarge, spread
+from lbw_minimal.report import wilson
+
+LINES = ("-", "--", "-.", ":")
+
+
+def _show(axis: Axes, image: np.ndarray, title: str = "") -> None:
+    axis.imshow(image)
+    axis.set(xticks=[], yticks=[], title=title)
+    axis.title.set_fontsize(9)
+    for side in axis.spines.values():
+        side.set_visible(False)
+
+
+def overview(pairs: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> Figure:
+    """The paper's task overview: for each task a frame of the human above one of the robot."""
+    with rc_context(STYLE):
+        figure = Figure(figsize=(1.7 * len(pairs), 3.7))
+        axes = figure.subplots(2, len(pairs), squeeze=False)
+        for column, (task, (human, robot)) in zip(axes.T, pairs.items(), strict=True):
+            _show(column[0], human, task)
+            _show(column[1], robot)
+        axes[0, 0].set_ylabel("human video")
+        axes[1, 0].set_ylabel("robot's camera")
+    return figure
+
+
+def strips(rows: Mapping[str, np.ndarray], n: int = 6) -> Figure:
+    """Some moments of films (T, H, W, 3) of equal length, one below the other, as in Figure 5."""
+    i = spread(len(next(iter(rows.values()))), n)
+    with rc_context(STYLE):
+        figure = Figure(figsize=(1.5 * len(i), 1.55 * len(rows)))
+        axes = figure.subplots(len(rows), len(i), squeeze=False)
+        for line, (name, frames) in zip(axes, rows.items(), strict=True):
+            for axis, frame in zip(line, frames[i], strict=True):
+                _show(axis, frame)
+            line[0].set_ylabel(name, fontsize=9)
+    return figure
+
+
+def method(
+    human: np.ndarray, translated: np.ndarray, z_E: np.ndarray, robot: np.ndarray, z: np.ndarray
+) -> Figure:
+    """The paper's Figure 2 from real frames (84, 84, 3) and their keypoints (K, 2).
+
+    Above, the human video on its way to a keypoint trajectory; below, the robot's observation on
+    its way to an action; between them the reward.
+    """
+    detected = draw_keypoints(np.stack([translated, robot]), np.stack([z_E, z]), 4)
+    upper = [(enlarge(human[None], 4)[0], "human video $x_i^E$"),
+             (enlarge(translated[None], 4)[0], "translated $v_i^E$"),
+             (detected[0], "its keypoints $z_i^E$")]  # fmt: skip
+    lower = [(enlarge(robot[None], 4)[0], "robot's view $O_t$"),
+             (detected[1], "its keypoints $z_t$")]  # fmt: skip
+    with rc_context(STYLE | {"figure.constrained_layout.use": False}):
+        figure = Figure(figsize=(9.2, 4.4))
+        page = figure.add_axes((0, 0, 1, 1))
+        page.set(xlim=(0, 9.2), ylim=(0, 4.4))
+        page.axis("off")
+        for x, y, (image, title) in zip(
+            (0.2, 2.7, 5.2, 0.2, 2.7), (2.45, 2.45, 2.45, 0.15, 0.15), upper + lower, strict=True
+        ):
+            page.imshow(image, extent=(x, x + 1.6, y, y + 1.6), aspect="equal")
+            page.text(x + 0.8, y + 1.68, title, ha="center", fontsize=9)
+        for (x, y), (u, v), name in (
+            ((1.85, 3.25), (2.65, 3.25), "MUNIT\nEq. 1-5"),
+            ((4.35, 3.25), (5.15, 3.25), "Transporter\nEq. 6-7"),
+            ((1.85, 0.95), (2.65, 0.95), "Transporter"),
+            ((4.35, 0.95), (7.25, 0.95), "policy $\\pi(z_t)$"),
+            ((6.85, 3.25), (7.55, 2.55), ""),
+            ((4.35, 1.35), (7.25, 2.05), ""),
+        ):
+            page.annotate("", (u, v), (x, y), arrowprops={"arrowstyle": "-|>", "lw": 1.4})
+            page.text((x + u) / 2, (y + v) / 2 + 0.09, name, ha="center", va="bottom", fontsize=8)
+        box = {"boxstyle": "round", "facecolor": "#f2f4f7", "edgecolor": "#888888"}
+        page.text(8.1, 2.3, "reward $r_t$\nEq. 8-10", ha="center", va="center", bbox=box)
+        page.text(8.1, 0.95, "action $a_t$\nby SAC", ha="center", va="center", bbox=box)
+        page.annotate("", (8.1, 1.3), (8.1, 1.95), arrowprops={"arrowstyle": "-|>", "lw": 1.4})
+        page.set(xlim=(0, 9.2), ylim=(0, 4.4))  # imshow changed them
+    return figure
+
+
+def over_jitter(found: Mapping[str, Mapping[str, Mapping[str, int]]], episodes: int) -> Figure:
+    """Success of the policy and its controls over start jitter, with 95 % intervals.
+
+    found: task -> jitter in m, as text -> robot -> successes of `episodes`.
+    """
+    with rc_context(STYLE):
+        figure = Figure(figsize=(2.5 * len(found), 3.2))
+        axes = figure.subplots(1, len(found), sharey=True, squeeze=False)[0]
+        for axis, (task, by_jitter) in zip(axes, found.items(), strict=True):
+            x = [1000 * float(jitter) for jitter in by_jitter]
+            for k, robot in enumerate(next(iter(by_jitter.values()))):
+                wins = [row[robot] for row in by_jitter.values()]
+                low, high = zip(*(wilson(n, episodes) for n in wins), strict=True)
+                paint = COLOURS[k % len(COLOURS)]
+                share = np.array(wins) / episodes
+                axis.plot(x, share, LINES[k // 3 % 4], marker="o", ms=3, color=paint, label=robot)
+                axis.fill_between(x, low, high, color=paint, alpha=0.12, lw=0)
+            axis.set(title=task, xlabel="start jitter (mm)", xscale="log", ylim=(-0.03, 1.03))
+            axis.set_xticks(x, [f"{v:g}" for v in x])
+            axis.minorticks_off()
+        axes[0].set_ylabel("success")
+        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    return figure
+
+
+def over_steps(logs: Mapping[str, Mapping[str, Sequence[list[dict]]]], last: int = 20) -> Figure:
+    """Share of training episodes that succeed over environment steps, a line a run.
+
+    logs: task -> method -> logs of its runs, as `sac.train` returns them. last: episodes that the
+    mean runs over. A method that has not got there yet is seen to be on its way, or not.
+    """
+    with rc_context(STYLE):
+        figure = Figure(figsize=(2.5 * len(logs), 2.9))
+        axes = figure.subplots(1, len(logs), sharey=True, squeeze=False)[0]
+        for axis, (task, methods) in zip(axes, logs.items(), strict=True):
+            for k, (name, runs) in enumerate(methods.items()):
+                for i, log in enumerate(runs):
+                    hits = np.array([row["success"] for row in log], float)
+                    mean = [hits[max(0, j + 1 - last) : j + 1].mean() for j in range(len(hits))]
+                    steps = [row["step"] for row in log]
+                    label = name if i == 0 else None
+                    axis.plot(steps, mean, LINES[k % 4], color=COLOURS[k + 1], lw=1.3, label=label)
+            axis.set(title=task, xlabel="environment steps", ylim=(-0.03, 1.03))
+        axes[0].set_ylabel(f"success, mean of {last} episodes")
+        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    return figure
