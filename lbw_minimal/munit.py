@@ -6,63 +6,33 @@ Out: the networks, and the translated video. Three things are not in the paper: 
 weighted by the distance from the median frame, and least squares. Without them small objects
 vanish, or wall and table swap their brightness.
 
-The comments on the constants say what other values did while the kit was built. No results file
-holds those runs; notebook 4 repeats some of them.
+The comments on the constants, here and in `gan.py`, say what other values did while the kit was
+built. No results file holds those runs; notebook 4 repeats some of them.
 """
 
 from __future__ import annotations
 
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import torch
-import torch.nn.functional as F
 from torch import nn
 
-from lbw_minimal.images import median_frame, motion_weight, to_frames, to_images
+from lbw_minimal import gan
+from lbw_minimal.gan import LOG_EVERY, MOTION_GAN, MOTION_L1, Critics, Losses, l1, least_squares
+from lbw_minimal.images import motion_weight, to_images
 from lbw_minimal.munit_networks import MUNIT, Critic, bfloat16
-from lbw_minimal.training import (
-    Checkpoint,
-    InputError,
-    load_state,
-    pick_device,
-    progress,
-    save_state,
-    seed_everything,
-)
+from lbw_minimal.training import Checkpoint, pick_device, progress, seed_everything
 
 # Of Eq. 5. They are half of MUNIT's; with MUNIT's own the arm stays blurred.
 LAMBDA_IMAGE, LAMBDA_CONTENT, LAMBDA_STYLE = 5.0, 0.5, 0.5
 # Not in the paper. MUNIT's authors add it where pixels must stay aligned, as here.
 LAMBDA_CYCLE = 5.0
-# Not in the paper: weights of what differs from the median frame, see `motion_weight`.
-MOTION_L1 = 4.0  # with 0 the L1 losses forget the object, which covers 1 % of the picture
-MOTION_GAN = 20.0  # with 0 the critics hardly look at the arm: four fifths of the patches are wall
 # Of the two Adams; both fall to 0 over the second half. With critics as slow as the generators the
 # arm stays blurred.
 LEARNING_RATE, CRITIC_RATE = 4e-4, 1.2e-3
-AVERAGE = 0.995  # decay per step of the averaged weights, which flicker less from frame to frame
-LOG_EVERY = 50  # steps
-MADE = {"x": "x_of_y", "y": "y_of_x"}  # which of `mean_images` are translations into a domain
-
-Losses = dict[str, torch.Tensor]
-Critics = Mapping[str, Critic] | nn.ModuleDict
-
-
-def _l1(a, b, weight=1.0):
-    return (weight * (a.float() - b.float()).abs()).mean()
-
-
-def _least_squares(scores, target, weight):
-    # Not in the paper. The logarithms of Eq. 1 leave a losing generator without a gradient; squares
-    # do not.
-    loss = 0.0
-    for score in scores:  # (B, 1, h, w) of one scale
-        cells = F.adaptive_avg_pool2d(weight, score.shape[2:])
-        loss = loss + (cells / cells.mean() * (score.float() - target) ** 2).mean() / len(scores)
-    return loss
 
 
 def swap(model: MUNIT, x: torch.Tensor, y: torch.Tensor) -> tuple[torch.Tensor, ...]:
@@ -92,16 +62,16 @@ def generator_losses(
     w_x_of_y = motion_weight(x_of_y, median_x, MOTION_GAN)
     w_y_of_x = motion_weight(y_of_x, median_y, MOTION_GAN)
     return {
-        "L_GAN^x": _least_squares(critics["x"](x_of_y), 1.0, w_x_of_y),  # Eq. 1
-        "L_GAN^y": _least_squares(critics["y"](y_of_x), 1.0, w_y_of_x),
-        "L_rec^x": _l1(model.decode(c_x, s_x, "x"), x, w_x),  # Eq. 2
-        "L_rec^y": _l1(model.decode(c_y, s_y, "y"), y, w_y),
-        "L_rec^c_x": _l1(c_x_again, c_x),  # Eq. 3
-        "L_rec^c_y": _l1(c_y_again, c_y),
-        "L_rec^s_x": _l1(model.style(x_of_y, "x"), s_x),  # Eq. 4
-        "L_rec^s_y": _l1(model.style(y_of_x, "y"), s_y),
-        "L_cyc^x": _l1(model.decode(c_x_again, s_x, "x"), x, w_x),  # not in the paper
-        "L_cyc^y": _l1(model.decode(c_y_again, s_y, "y"), y, w_y),
+        "L_GAN^x": least_squares(critics["x"](x_of_y), 1.0, w_x_of_y),  # Eq. 1
+        "L_GAN^y": least_squares(critics["y"](y_of_x), 1.0, w_y_of_x),
+        "L_rec^x": l1(model.decode(c_x, s_x, "x"), x, w_x),  # Eq. 2
+        "L_rec^y": l1(model.decode(c_y, s_y, "y"), y, w_y),
+        "L_rec^c_x": l1(c_x_again, c_x),  # Eq. 3
+        "L_rec^c_y": l1(c_y_again, c_y),
+        "L_rec^s_x": l1(model.style(x_of_y, "x"), s_x),  # Eq. 4
+        "L_rec^s_y": l1(model.style(y_of_x, "y"), s_y),
+        "L_cyc^x": l1(model.decode(c_x_again, s_x, "x"), x, w_x),  # not in the paper
+        "L_cyc^y": l1(model.decode(c_y_again, s_y, "y"), y, w_y),
     }
 
 
@@ -128,8 +98,8 @@ def discriminator_losses(
     """The critics' side of Eq. 1 in least squares: 1 for real x and y, 0 for their translations."""
 
     def loss(D, real, made, median):
-        w_real, w_made = (motion_weight(v, median, MOTION_GAN) for v in (real, made))
-        return _least_squares(D(real), 1.0, w_real) + _least_squares(D(made), 0.0, w_made)  # Eq. 1
+        weights = (motion_weight(v, median, MOTION_GAN) for v in (real, made))
+        return gan.critic_loss(D, real, made, *weights)  # Eq. 1
 
     x_of_y, y_of_x = swapped[4].detach(), swapped[5].detach()
     return {
@@ -138,42 +108,19 @@ def discriminator_losses(
     }
 
 
-def _draw(frames, n, rng, device):
-    return to_images(frames[rng.integers(len(frames), size=n)], device)
-
-
 def _update(model, critics, adam_G, adam_D, x, y, medians) -> dict[str, float]:
     """A step of the generators, then one of the critics, on images x and y; all their losses."""
     critics.requires_grad_(False)  # the generators' step learns through the critics, not in them
     with bfloat16(x.device):
         swapped = swap(model, x, y)
         L_G = generator_losses(model, critics, x, y, swapped, *medians)
-    adam_G.zero_grad()
-    total_loss(L_G).backward()
-    adam_G.step()
+    gan.descend(adam_G, total_loss(L_G))
 
     critics.requires_grad_(True)
     with bfloat16(x.device):  # on the translations made above: new ones would cost an eighth more
         L_D = discriminator_losses(critics, x, y, swapped, *medians)
-    adam_D.zero_grad()
-    (L_D["L_D^x"] + L_D["L_D^y"]).backward()
-    adam_D.step()
+    gan.descend(adam_D, L_D["L_D^x"] + L_D["L_D^y"])
     return {name: loss.item() for name, loss in (L_G | L_D).items()}
-
-
-@torch.no_grad()
-def _follow(average, model, step):
-    # A short memory at first, or the random start would stay in the average for a long time.
-    decay = min(AVERAGE, step / (step + 10))
-    for mean, p in zip(average.parameters(), model.parameters(), strict=True):
-        mean.lerp_(p, 1 - decay)
-
-
-def _row(step, sums, average, human, robot) -> dict[str, float]:
-    mean = mean_images(average, human, robot)
-    off = {d: float(np.abs(mean[made] - mean[d]).mean()) for d, made in MADE.items()}
-    row = {"step": step} | {name: value / LOG_EVERY for name, value in sums.items()}
-    return row | {f"mean_image^{d}": grey_levels for d, grey_levels in off.items()}
 
 
 def train(
@@ -189,20 +136,15 @@ def train(
 ) -> tuple[MUNIT, list[dict]]:
     """Train on human and robot frames (T, 84, 84, 3) uint8.
 
-    Returns the model of averaged weights and a log. A row of the log holds `step`, each loss's mean
-    since the row before, and how many grey levels (0-255) the mean translation is off that domain's
-    mean frame, `mean_image^x` and `mean_image^y`. Different poses cost a few; over 20 two regions,
-    such as wall and table, have swapped their brightness.
+    Returns the model of averaged weights and a log of `log_row`s.
     """
     checkpoint = checkpoint or Checkpoint(None)
     rng, to = seed_everything(seed), pick_device(device)
     model = MUNIT(width).to(to)
     critics = nn.ModuleDict({domain: Critic() for domain in "xy"}).to(to)
     average = copy.deepcopy(model)
-    adam_G = torch.optim.Adam(model.parameters(), LEARNING_RATE, betas=(0.5, 0.999))
-    adam_D = torch.optim.Adam(critics.parameters(), CRITIC_RATE, betas=(0.5, 0.999))
-    # in whole grey levels, as when the shipped weights were trained
-    medians = [to_images(median_frame(v).astype(np.uint8), to) for v in (human, robot)]
+    adam_G, adam_D = gan.adam(model, LEARNING_RATE), gan.adam(critics, CRITIC_RATE)
+    medians = [gan.median_image(frames, to) for frames in (human, robot)]
     now, state = checkpoint.resume(
         dict(model=model, critics=critics, average=average, adam_G=adam_G, adam_D=adam_D, rng=rng),
         step=0, log=[], sums={},
@@ -210,15 +152,16 @@ def train(
 
     bar = progress(iterations, "MUNIT", now.step)
     while now.step < iterations:
-        for adam, rate in ((adam_G, LEARNING_RATE), (adam_D, CRITIC_RATE)):
-            adam.param_groups[0]["lr"] = rate * min(1.0, 2 * (1 - now.step / iterations))
-        x, y = (_draw(frames, batch, rng, to) for frames in (human, robot))
+        gan.set_rate(adam_G, LEARNING_RATE, now.step / iterations)
+        gan.set_rate(adam_D, CRITIC_RATE, now.step / iterations)
+        x, y = (gan.draw(frames, batch, rng, to) for frames in (human, robot))
         losses = _update(model, critics, adam_G, adam_D, x, y, medians)
         now.step += 1
-        _follow(average, model, now.step)
+        gan.follow(average, model, now.step)
         now.sums = {name: now.sums.get(name, 0.0) + loss for name, loss in losses.items()}
         if now.step % LOG_EVERY == 0:
-            now.log.append(_row(now.step, now.sums, average, human, robot))
+            mean = mean_images(average, human, robot)
+            now.log.append(gan.log_row(now.step, now.sums, LOG_EVERY, mean))
             now.sums = {}
             bar.set_postfix_str(f"cycle {now.log[-1]['L_cyc^y']:.3f}")
         bar.update()
@@ -228,15 +171,11 @@ def train(
     return average.eval(), now.log
 
 
-def _spread(frames, n):
-    return frames[np.linspace(0, len(frames) - 1, min(n, len(frames))).astype(int)]
-
-
 @torch.no_grad()
 def robot_style(model: MUNIT, robot_frames: np.ndarray) -> torch.Tensor:
     """Mean style code (style_dim,) of up to 64 of the real robot frames (T, 84, 84, 3) uint8."""
     device = next(model.parameters()).device
-    return model.style(to_images(_spread(robot_frames, 64), device), "y").mean(0)
+    return model.style(to_images(gan.spread(robot_frames, 64), device), "y").mean(0)
 
 
 def translate(model: MUNIT, frames: np.ndarray, robot_style: torch.Tensor) -> np.ndarray:
@@ -248,13 +187,12 @@ def translate(model: MUNIT, frames: np.ndarray, robot_style: torch.Tensor) -> np
     return _decoded(model, frames, robot_style, "x", "y")
 
 
-@torch.no_grad()
 def _decoded(model, frames, style, source, target):
-    device, made = style.device, []
-    for start in range(0, len(frames), 32):
-        c = model.content(to_images(frames[start : start + 32], device), source)
-        made.append(to_frames(model.decode(c, style.expand(len(c), -1), target)))
-    return np.concatenate(made)
+    def swapped(image):
+        c = model.content(image, source)
+        return model.decode(c, style.expand(len(c), -1), target)
+
+    return gan.repaint(frames, swapped, style.device)
 
 
 @torch.no_grad()
@@ -263,7 +201,7 @@ def mean_images(model: MUNIT, human: np.ndarray, robot: np.ndarray) -> dict[str,
 
     "x_of_y" is what the robot's frames look like in the human domain, "y_of_x" the other way round.
     """
-    human, robot = _spread(human, 32), _spread(robot, 32)
+    human, robot = gan.spread(human, 32), gan.spread(robot, 32)
     s_x = model.style(to_images(human, next(model.parameters()).device), "x").mean(0)
     x_of_y = _decoded(model, robot, s_x, "y", "x")
     y_of_x = translate(model, human, robot_style(model, robot))
@@ -272,14 +210,8 @@ def mean_images(model: MUNIT, human: np.ndarray, robot: np.ndarray) -> dict[str,
 
 
 def save(path: Path | str, model: MUNIT, style: torch.Tensor, task: str) -> None:
-    """Write the model with its sizes, the robot style (style_dim,) to translate with, and its task.
-
-    In half precision, which halves the file and moves a translated pixel by a grey level at most.
-    A shared encoder is written once.
-    """
-    weights = {name: w.half() for name, w in model.named_parameters()}
-    what = {"kind": "munit", "task": task, "sizes": model.sizes}
-    save_state(path, what | {"model": weights, "style": style})
+    """Write the model, the robot style (style_dim,) to translate with, and its task."""
+    gan.save_weights(path, model, task, style=style)
 
 
 def load(path: Path | str, task: str) -> tuple[MUNIT, torch.Tensor]:
@@ -287,17 +219,5 @@ def load(path: Path | str, task: str) -> tuple[MUNIT, torch.Tensor]:
 
     Raises InputError if the file holds something else or belongs to another task.
     """
-    saved = load_state(path)
-    if saved.get("kind") != "munit":
-        raise InputError(
-            f"{path}: not the weights of a MUNIT; give the file that its training wrote."
-        )
-    if saved["task"] != task:
-        raise InputError(
-            f"{path}: weights of the task {saved['task']}, not of {task}; give those or train anew."
-        )
-    model = MUNIT(**saved["sizes"])
-    with torch.no_grad():
-        for name, p in model.named_parameters():
-            p.copy_(saved["model"][name])
-    return model.eval(), saved["style"]
+    model, saved = gan.load_weights(path, MUNIT, task)
+    return model, saved["style"]

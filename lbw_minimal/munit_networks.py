@@ -33,8 +33,10 @@ class _Residual(nn.Module):
         return h + adain(self.second(F.relu(adain(self.first(h), mean_1, std_1))), mean_2, std_2)
 
 
-class _ContentEncoder(nn.Module):
-    def __init__(self, width, blocks):
+class ContentEncoder(nn.Module):
+    """E^c: images to content codes (B, 4 width, 21, 21)."""
+
+    def __init__(self, width: int, blocks: int):
         super().__init__()
         # Half of the published network's time goes into its layers at 84 x 84. With 2 x 2 pixels
         # folded into channels, this one starts at 42 x 42 and loses nothing.
@@ -42,7 +44,8 @@ class _ContentEncoder(nn.Module):
         self.down = nn.Conv2d(2 * width, 4 * width, 4, 2, 1)
         self.blocks = nn.Sequential(*(_Residual(4 * width) for _ in range(blocks)))
 
-    def forward(self, x):
+    def forward(self, x: torch.Tensor) -> torch.Tensor:
+        """c of images x."""
         h = F.relu(self.stem(F.pixel_unshuffle(x, 2)))  # (B, 2 width, 42, 42)
         return self.blocks(F.relu(adain(self.down(h))))  # (B, 4 width, 21, 21)
 
@@ -87,10 +90,10 @@ class MUNIT(nn.Module):
         self.sizes = dict(
             width=width, style_dim=style_dim, blocks=blocks, shared_content=shared_content
         )
-        E_c = _ContentEncoder(width, blocks)
+        E_c = ContentEncoder(width, blocks)
         # With a shared encoder equal things start with equal codes in both domains. With two, only
         # the critics match them.
-        E_c_y = E_c if shared_content else _ContentEncoder(width, blocks)
+        E_c_y = E_c if shared_content else ContentEncoder(width, blocks)
         self.E_c = nn.ModuleDict({"x": E_c, "y": E_c_y})
         self.E_s = nn.ModuleDict({domain: _style_encoder(style_dim) for domain in "xy"})
         self.G = nn.ModuleDict({domain: _Decoder(width, style_dim, blocks) for domain in "xy"})
