@@ -1,8 +1,9 @@
-"""Two Gymnasium wrappers that turn an environment of images into the paper's, for any agent.
+"""Gymnasium wrappers that turn an environment of images into the paper's, for any agent.
 
 `KeypointObservation`: RGB frame O_t -> keypoints z_t = Psi(O_t). `KeypointRewardWrapper`: the
 environment's own reward is replaced by r_t of Eq. 8. What an agent sees and earns is a function of
 the frames, the demonstration and the number of steps taken, and of nothing else.
+`ClassifierRewardWrapper` does it for the rivals: frames are seen, and a goal classifier pays.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import gymnasium as gym
 import numpy as np
 from gymnasium.utils import RecordConstructorArgs
 
+from lbw_minimal.classifier import ClassifierReward
 from lbw_minimal.reward import KeypointReward
 
 
@@ -91,3 +93,22 @@ class KeypointRewardWrapper(gym.Wrapper, RecordConstructorArgs):
         ahead = reward.target(self._t).reshape(-1) - z
         seen = [z, z - z_1, z_1 - z_2, ahead, [reward.clock(self._t)]]
         return np.concatenate(seen).astype(np.float32)
+
+
+class ClassifierRewardWrapper(gym.Wrapper, RecordConstructorArgs):
+    """Pays the classifier's reward for the frame a step led to; the agent sees the frames.
+
+    The unclipped logit is in `info["reward_parts"]`. As in `KeypointRewardWrapper` an episode is
+    cut and never terminated: far from the goal logits are below zero.
+    """
+
+    def __init__(self, env: gym.Env, reward: ClassifierReward):
+        RecordConstructorArgs.__init__(self, _disable_deepcopy=True, reward=reward)
+        super().__init__(env)
+        self.classifier_reward = reward
+
+    def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict]:
+        """As Gymnasium's, paying for the new frame (84, 84, 3)."""
+        frame, _, terminated, truncated, info = self.env.step(action)
+        reward, parts = self.classifier_reward(frame)
+        return frame, reward, False, terminated or truncated, info | {"reward_parts": parts}

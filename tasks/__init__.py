@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -15,11 +16,12 @@ if TYPE_CHECKING:
     import numpy as np
 
     from lbw_minimal.imitate import Perception
-    from tasks.world import TaskEnv
+    from tasks.world import Recording, TaskEnv
 
 ROOT = Path(__file__).resolve().parent.parent
 VIDEOS = ROOT / "tasks" / "videos"
 WEIGHTS = ROOT / "solutions" / "weights"
+ROBOT_EXPERTS = 35  # videos that the classifier reward learns from, as in the paper
 TASKS = ("reach", "push", "slide", "coffee", "drawer")
 
 
@@ -64,6 +66,20 @@ def pace_film(name: str, seed: int = 0) -> np.ndarray:
     robot, _ = record_random(env, PACE, seed=seed)
     env.close()
     return robot
+
+
+def robot_experts(name: str, jitter: float) -> Iterator[tuple[np.ndarray, Recording]]:
+    """The robot's expert videos (T, 84, 84, 3) uint8 and their recordings, for the classifier
+    reward alone. Starts differ by up to `jitter` (m); so do the ways, as the human's do.
+
+    Filming takes 10 to 22 s of processor time and gives the same every time, so nothing is kept.
+    """
+    from tasks.world import expert_takes
+
+    env = bare(name, jitter=jitter)
+    for frames, _, recording in expert_takes(env, ROBOT_EXPERTS):
+        yield frames, recording
+    env.close()
 
 
 def keypoint_env(name: str, reward: str | None = "mended", **options: Any) -> gym.Env:

@@ -215,7 +215,7 @@ def test_a_folder_of_the_users_own_files_is_never_emptied(tmp_path, capfd):
 def test_filming_ends_when_the_expert_never_succeeds(tmp_path, monkeypatch, capfd):
     monkeypatch.setattr("tasks.VIDEOS", tmp_path)
     monkeypatch.setattr(
-        "tasks.commands.record.record_expert",
+        "tasks.world.motion.record_expert",
         lambda env, seed: (None, None, Recording(seed, False, None, None, None, [False])),
     )
     assert main(["record", "push"]) == 2

@@ -41,6 +41,19 @@ def test_the_method_names_nothing_of_the_simulators_state(path):
     assert not [w for w in words if w in path.read_text()]
 
 
+def test_only_the_classifier_reward_sees_the_robots_expert_videos():
+    """LbW and AVID-m learn from the human. Who films the robot's expert says so by this name."""
+    code = [*CODE, *sorted((ROOT / "solutions").glob("*.py"))]
+    users = {str(p.relative_to(ROOT)) for p in code if "robot_experts" in p.read_text()}
+    assert users == {"tasks/__init__.py", "tasks/commands/record.py"}
+    of_experts = {
+        str(p.relative_to(ROOT))
+        for p in code
+        if "expert_takes" in p.read_text() and p.parent.name != "world"
+    }
+    assert of_experts == {"tasks/__init__.py", "tasks/commands/record.py"}
+
+
 @every_file
 def test_nothing_is_unpickled(path):
     text = path.read_text()

@@ -6,7 +6,17 @@ import pytest
 import tasks
 from lbw_minimal import video
 from lbw_minimal.training import InputError
-from tasks.world import film, load_recordings, random_takes, record_expert, save_recordings
+from tasks.__main__ import main
+from tasks.commands.run import JITTER
+from tasks.world import (
+    Recording,
+    expert_takes,
+    film,
+    load_recordings,
+    random_takes,
+    record_expert,
+    save_recordings,
+)
 
 # m. Another processor may round the arm's linear algebra otherwise: with OpenBLAS's kernels without
 # fused multiplication reach, push and drawer stay as they are, coffee's mug ends 0.2 mm from here,
@@ -100,6 +110,33 @@ def test_a_file_of_recordings_that_is_missing_or_cut_is_named(tmp_path):
         path.write_bytes(other)
         with pytest.raises(InputError, match="not a complete file"):
             load_recordings(path)
+
+
+def test_the_robots_experts_are_filmed_as_they_are_learnt_from(tmp_path, monkeypatch):
+    monkeypatch.setattr("tasks.ROBOT_EXPERTS", 3)
+    monkeypatch.chdir(tmp_path)
+    assert main(["record", "reach", "--robot"]) == 0
+    folder = tmp_path / "runs" / "robot" / "reach"
+    kept = load_recordings(folder / "experts.npz")
+    again = list(tasks.robot_experts("reach", JITTER))
+    assert len(list(folder.glob("*.mp4"))) == len(kept) == len(again) == 3
+    for i, ((frames, recording), in_file) in enumerate(zip(again, kept, strict=True), 1):
+        assert recording.success[-1]
+        np.testing.assert_array_equal(recording.states, in_file.states)
+        assert differ(frames, video.read(folder / f"expert_{i:02d}.mp4")[0]) < 5e-4
+    starts = {tuple(recording.states[0, [0, 2]]) for recording in kept}
+    assert len(starts) == 3  # no two start alike
+    home = np.array(tasks.module("reach").Reach.START)[[0, 2]]
+    assert max(np.abs(np.array(start) - home).max() for start in starts) < JITTER + 1e-3  # m
+
+
+def test_a_take_that_fails_at_its_end_is_filmed_again(monkeypatch):
+    def take(env, seed):
+        success = np.array([True, seed % 2 == 1])  # done on the way is not enough
+        return None, None, Recording(seed, False, None, None, None, success)
+
+    monkeypatch.setattr("tasks.world.motion.record_expert", take)
+    assert [recording.seed for _, _, recording in expert_takes(None, 3)] == [1, 3, 5]
 
 
 def features(states):

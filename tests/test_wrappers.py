@@ -5,12 +5,18 @@ import warnings
 import gymnasium as gym
 import numpy as np
 import pytest
+import torch
 from gymnasium.utils.env_checker import check_env
 from toy_push import ToyPush, demonstration, detect, random_frames
 
+from lbw_minimal.classifier import ClassifierReward, GoalClassifier
 from lbw_minimal.reward import LiteralReward, MendedReward
 from lbw_minimal.sac import train
-from lbw_minimal.wrappers import KeypointObservation, KeypointRewardWrapper
+from lbw_minimal.wrappers import (
+    ClassifierRewardWrapper,
+    KeypointObservation,
+    KeypointRewardWrapper,
+)
 
 K = 4
 
@@ -162,6 +168,40 @@ def test_an_end_of_the_task_is_no_end_worth_reaching(reward):
     env.reset(seed=0)
     ends = [env.step(np.zeros(3, np.float32))[2:4] for _ in range(3)]
     assert ends == [(False, False), (False, False), (False, True)]
+
+
+def goal_reward():
+    torch.manual_seed(0)
+    return ClassifierReward(GoalClassifier())
+
+
+def test_gymnasium_has_nothing_to_complain_about_in_the_classifiers_wrapper():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warnings.filterwarnings("ignore", "(?s).*is different from the unwrapped version")
+        check_env(ClassifierRewardWrapper(ToyPush(), goal_reward()), skip_render_check=True)
+
+
+def test_the_classifier_pays_for_the_frame_a_step_led_to_and_for_nothing_else():
+    frames, reward = demonstration(), goal_reward()
+    seen, paid = play(ClassifierRewardWrapper(Film(frames, reward=1000.0), reward))
+    assert (seen == frames[:21]).all()
+    expected = [reward(frame)[0] for frame in frames[1:21]]
+    assert paid.tolist() == expected and len(set(expected)) > 10
+
+
+def test_the_classifiers_wrapper_cuts_an_episode_and_tells_the_logit():
+    class Lost(Film):
+        def step(self, action):
+            frame, paid, _, truncated, _ = super().step(action)
+            return frame, paid, self.t == 2, truncated, {"is_success": True}
+
+    env = ClassifierRewardWrapper(Lost(demonstration()), goal_reward())
+    env.reset(seed=0)
+    assert env.step(np.zeros(3, np.float32))[2:4] == (False, False)
+    _, paid, terminated, truncated, info = env.step(np.zeros(3, np.float32))
+    assert (terminated, truncated) == (False, True) and info["is_success"]
+    assert info["reward_parts"]["logit"] == pytest.approx(paid)  # too near 0 to be clipped
 
 
 def test_our_agent_trains_on_it(reward):

@@ -8,6 +8,7 @@ episode, `viewer` the scene in a browser. A task file and a notebook take the na
 from tasks.world.env import Leg, TaskEnv
 from tasks.world.motion import (
     expert_actions,
+    expert_takes,
     random_actions,
     random_takes,
     record_expert,
@@ -29,6 +30,7 @@ __all__ = [
     "TaskEnv",
     "World",
     "expert_actions",
+    "expert_takes",
     "film",
     "load_recordings",
     "random_actions",

@@ -11,9 +11,12 @@ from itertools import count, islice
 
 import numpy as np
 
+from lbw_minimal.training import InputError
 from tasks.world.env import LOW, TaskEnv
 from tasks.world.recording import Recording, film
 from tasks.world.scene import DT, SUBSTEPS
+
+TRIES = 3  # a video: a human films again when it goes wrong, but not for ever
 
 
 def expert_actions(env: TaskEnv, rng: np.random.Generator | None = None) -> Iterator[np.ndarray]:
@@ -89,3 +92,20 @@ def _wander(env, rng, take):
 def record_expert(env: TaskEnv, seed: int) -> tuple[np.ndarray, np.ndarray, Recording]:
     """Film one human-like expert episode. Returns what `film` does."""
     return film(env, seed, expert_actions(env, np.random.default_rng(seed)))
+
+
+def expert_takes(env: TaskEnv, wanted: int) -> Iterator[tuple[np.ndarray, np.ndarray, Recording]]:
+    """Film expert episodes of seeds 0, 1, ... until so many have succeeded.
+
+    Yields what `film` returns, for each that did. Raises InputError if the expert fails too often.
+    """
+    filmed = 0
+    for seed in range(TRIES * wanted):
+        take = record_expert(env, seed)
+        if take[2].success[-1]:
+            yield take
+            filmed += 1
+            if filmed == wanted:
+                return
+    name, tries = type(env).__name__.lower(), f"{filmed} of {TRIES * wanted} tries"
+    raise InputError(f"{name}: its expert succeeds in {tries}; mend its waypoints.")
