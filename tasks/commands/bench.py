@@ -20,7 +20,7 @@ import numpy as np
 import torch
 from gymnasium.utils.performance import benchmark_step
 
-from lbw_minimal import munit, sac, transporter
+from lbw_minimal import cyclegan, munit, sac, transporter
 from lbw_minimal.replay import ReplayBuffer
 from tasks import TASKS, id_of
 from tasks.commands import Parser, at_least
@@ -45,7 +45,9 @@ def main(argv: list[str]) -> None:
         ours = {f"{task} (ours)": env_steps(our_env(task, filmed)) for task in ("push", *TASKS)}
         contest(what, ours | peers(filmed), seconds)
     frames = np.random.default_rng(0).integers(0, 256, (64, 84, 84, 3), np.uint8)
-    contest("an iteration of MUNIT", {"ours": iterations(munit.train, frames, frames)}, seconds)
+    translations = {"MUNIT (ours)": munit.train, "CycleGAN (ours)": cyclegan.train}
+    ours = {name: iterations(train, frames, frames) for name, train in translations.items()}
+    contest("an iteration of a translation", ours, seconds)
     contest(
         "an iteration of Transporter", {"ours": iterations(transporter.train, [frames])}, seconds
     )
