@@ -85,13 +85,14 @@ class Run:
 
     @contextmanager
     def stage(self, name: str) -> Iterator[Checkpoint]:
-        """Lend a checkpoint to a training. Afterwards note the time it took and drop the file."""
+        """Lend a checkpoint to a training. Afterwards note the time it took and drop its files."""
         path = self.out / f"{name}.checkpoint"
         checkpoint = Checkpoint(path)
         yield checkpoint
         self.metrics["stages"][name] = round(checkpoint.spent, 1)
         self.save()
-        path.unlink(missing_ok=True)
+        for file in (path, path.with_suffix(".frames")):  # a policy's from pixels
+            file.unlink(missing_ok=True)
 
     def log(self, name: str, rows: list[dict]) -> None:
         """Write the log of a training."""

@@ -67,30 +67,34 @@ class SAC:
         entropy: float = -1.0,
     ):
         self.gamma, self.tau, self.average = gamma, tau, average
-        self.normalise = Normaliser(obs_dim)
+        self.normalise: Any = Normaliser(obs_dim)
         self.actor = Actor(obs_dim, action_dim, width)
-        self.sizes = self.actor.sizes
         self.critic = TwinCritic(obs_dim, action_dim, width)
-        self.log_alpha = torch.tensor(math.log(alpha), requires_grad=True)
-        self.entropy = entropy
-        self.target_entropy = entropy * action_dim
-        self.test_actor = deepcopy(self.actor).requires_grad_(False)
-        self.target = deepcopy(self.critic).requires_grad_(False)
+        self._set_up(alpha, entropy)
         # One optimizer for all: the calls, not the arithmetic, are what a small network costs.
         self._of_critic = [*self.critic.parameters(), self.log_alpha]
-        self._of_actor = list(self.actor.parameters())
+        self._of_actor: list[torch.Tensor] = list(self.actor.parameters())
         groups = [
             {"params": self._of_critic, "lr": critic_lr},
             {"params": self._of_actor, "lr": actor_lr},
         ]
         self.optimizer = torch.optim.Adam(groups, fused=True)
-        self.rates = critic_lr, actor_lr
+        self.rates: tuple[float, ...] = critic_lr, actor_lr
         self._slow: list[list[torch.Tensor]] = [
             list(m.parameters()) for m in (self.target, self.test_actor)
         ]
         self._fast: list[list[torch.Tensor]] = [
             list(m.parameters()) for m in (self.critic, self.actor)
         ]
+
+    def _set_up(self, alpha, entropy):
+        """What follows from actor and critic, for any of them."""
+        self.sizes = self.actor.sizes
+        self.log_alpha = torch.tensor(math.log(alpha), requires_grad=True)
+        self.entropy = entropy
+        self.target_entropy = entropy * self.sizes["action_dim"]
+        self.test_actor = deepcopy(self.actor).requires_grad_(False)
+        self.target = deepcopy(self.critic).requires_grad_(False)
 
     @property
     def alpha(self) -> float:
@@ -105,6 +109,10 @@ class SAC:
         fallen = min(1.0, passed / ENTROPY_FALLEN)
         target = self.entropy + fallen * (ENTROPY_TO - self.entropy)
         self.target_entropy = target * self.sizes["action_dim"]
+
+    def observe(self, obs: np.ndarray) -> None:
+        """Take an observation (S,) of training into the running normalisation."""
+        self.normalise.observe(obs)
 
     def act(self, obs: np.ndarray, deterministic: bool = False) -> np.ndarray:
         """Action (A,) in [-1, 1] for an observation (S,): a sample, or the test actor's mean."""
@@ -204,25 +212,53 @@ def train(
     starts from (seed, episode), and checkpoints are taken between episodes. The agent's test-time
     actor is chosen at the end, by return: see `best_actor`.
     """
-    checkpoint, rng = checkpoint or Checkpoint(None), seed_everything(seed)
-    sac = SAC(_length(env.observation_space), _length(env.action_space), **recipe)
-    sizes = sac.sizes["obs_dim"], sac.sizes["action_dim"]
+    rng = seed_everything(seed)
+    sac = SAC(length(env.observation_space), length(env.action_space), **recipe)
     # A short run can keep all it has seen.
-    buffer = ReplayBuffer(*sizes, steps + 1000)
+    buffer = ReplayBuffer(sac.sizes["obs_dim"], sac.sizes["action_dim"], steps + 1000)
+    log = learn(
+        env, sac, buffer, rng, steps=steps, seed=seed, checkpoint=checkpoint, evaluate=evaluate,
+        evaluate_every=evaluate_every, updates=updates, random_steps=random_steps, batch=batch,
+    )  # fmt: skip
+    return sac, log
+
+
+def learn(
+    env: gym.Env,
+    sac: SAC,
+    buffer: Any,
+    rng: np.random.Generator,
+    *,
+    steps: int,
+    seed: int,
+    checkpoint: Checkpoint | None,
+    evaluate: Callable[[Any], dict[str, float]] | None,
+    evaluate_every: int,
+    updates: int,
+    random_steps: int,
+    batch: int,
+) -> list[dict]:
+    """The loop of `train`, for any agent that is a `SAC` and any buffer with its methods.
+
+    Returns the log.
+    """
+    checkpoint = checkpoint or Checkpoint(None)
     stateful = {"sac": sac, "buffer": buffer, "rng": rng}
     now, state = checkpoint.resume(stateful, step=0, log=[], candidates=[])
     bar = progress(steps, "policy", now.step)
     while now.step < steps:
-        rows, losses, ended = [], [], False
+        rows: list[dict] = []
+        losses, ended = [], False
         obs, _ = env.reset(seed=_seed(seed, len(now.log)))
-        sac.normalise.observe(obs)
+        sac.observe(obs)
         while not ended:
             random = now.step < random_steps
             action = _uniform(rng, env) if random else sac.act(obs)
             next_obs, reward, terminal, truncated, info = env.step(action)
             # `truncated` stays out: the time limit is the clock's doing, and s' keeps its value.
-            buffer.add(obs=obs, action=action, reward=reward, next_obs=next_obs, terminal=terminal)
-            sac.normalise.observe(next_obs)
+            step = {"obs": obs, "action": action, "reward": reward, "next_obs": next_obs}
+            buffer.add(first=not rows, terminal=terminal, **step)
+            sac.observe(next_obs)
             rows.append({"reward": float(reward), **info.get("reward_parts", {})})
             obs, ended, now.step = next_obs, terminal or truncated, now.step + 1
             if now.step > random_steps:
@@ -240,11 +276,12 @@ def train(
     checkpoint.save(state, force=True)
     actors = [c["actor"] for c in now.candidates] + [deepcopy(sac.test_actor.state_dict())]
     sac.test_actor.load_state_dict(best_actor(env, sac, actors, seed))
-    return sac, now.log
+    return now.log
 
 
-def _length(space):
+def length(space: gym.Space) -> int:
     """Of the vectors in a Box."""
+    assert isinstance(space, gym.spaces.Box)
     return space.shape[0]
 
 
@@ -263,7 +300,8 @@ def _row(episode, step, rows, losses, info):
     row = {"episode": episode, "step": step, "length": len(rows)}
     row |= {"return": sum(r["reward"] for r in rows), "success": bool(info.get("is_success"))}
     for many in (rows, losses):
-        row |= {k: float(np.mean([r[k] for r in many])) for k in (many[0] if many else ())}
+        names = dict.fromkeys(k for r in many for k in r)  # not every update tells all of them
+        row |= {k: float(np.mean([r[k] for r in many if k in r])) for k in names}
     return row
 
 

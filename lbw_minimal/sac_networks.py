@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import torch
@@ -50,7 +51,7 @@ class Actor(nn.Module):
 
     def __init__(self, obs_dim: int, action_dim: int, width: int):
         super().__init__()
-        self.sizes = {"obs_dim": obs_dim, "action_dim": action_dim, "width": width}
+        self.sizes: dict[str, Any] = {"obs_dim": obs_dim, "action_dim": action_dim, "width": width}
         self.net = nn.Sequential(
             *(nn.Linear(obs_dim, width), nn.ReLU()),
             *(nn.Linear(width, width), nn.ReLU()),
@@ -65,25 +66,29 @@ class Actor(nn.Module):
 
     def sample(self, s: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
         """Draw actions (B, A) with their log-density (B,), differentiable in the weights."""
-        mean, log_std = self(s)
-        noise = torch.randn_like(mean)
-        u = mean + log_std.exp() * noise
-        # log N(u) - log |da/du|, and log(1 - tanh(u)^2) = 2 (log 2 - u - softplus(-2u)) never
-        # overflows
-        log_normal = -0.5 * noise.square() - log_std - 0.5 * math.log(2 * math.pi)
-        log_slope = 2 * (math.log(2) - u - F.softplus(-2 * u))
-        return torch.tanh(u), (log_normal - log_slope).sum(-1)
+        return draw(*self(s))
+
+
+def draw(mean: torch.Tensor, log_std: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+    """Draw a = tanh(u) (B, A), u ~ Normal(mean, std), with its log-density (B,)."""
+    noise = torch.randn_like(mean)
+    u = mean + log_std.exp() * noise
+    # log N(u) - log |da/du|, and log(1 - tanh(u)^2) = 2 (log 2 - u - softplus(-2u)) never
+    # overflows
+    log_normal = -0.5 * noise.square() - log_std - 0.5 * math.log(2 * math.pi)
+    log_slope = 2 * (math.log(2) - u - F.softplus(-2 * u))
+    return torch.tanh(u), (log_normal - log_slope).sum(-1)
 
 
 class Policy:
-    """All that acting takes: an actor, and what brings observations to the size it knows."""
+    """All that acting takes: an actor, and what brings observations to the range it knows."""
 
-    def __init__(self, actor: Actor, normalise: Normaliser):
+    def __init__(self, actor: Actor, normalise: nn.Module):
         self.actor, self.normalise, self.sizes = actor, normalise, actor.sizes
 
     @torch.no_grad()
     def act(self, obs: np.ndarray, deterministic: bool = False) -> np.ndarray:
-        """Action (A,) float32 in [-1, 1] for an observation (S,): a sample, or the mean."""
+        """Action (A,) float32 in [-1, 1] for an observation: a sample, or the mean."""
         s = self.normalise(torch.as_tensor(obs, dtype=torch.float32))
         a = torch.tanh(self.actor(s)[0]) if deterministic else self.actor.sample(s)[0]
         return a.numpy()

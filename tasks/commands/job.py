@@ -26,7 +26,7 @@ from lbw_minimal.training import InputError, pick_device, write_atomic
 from tasks.commands import JITTER, Parser, at_least, make_folder, metres
 
 TEST_EPISODES = 10  # as in the paper
-RESULTS = ("*.checkpoint", "*.safetensors", "*_log.json", "metrics.json", "report.html")
+RESULTS = ("*.checkpoint", "*.frames", "*.safetensors", "*_log.json", "metrics.json", "report.html")
 FAST = {
     "munit_iterations": 20,
     "munit_width": 8,

@@ -1,0 +1,474 @@
+"""SAC+AE against its publication: which loss trains what, at what pace, from which frames."""
+
+import time
+from copy import deepcopy
+
+import gymnasium as gym
+import numpy as np
+import pytest
+import torch
+from gymnasium.wrappers import FrameStackObservation, TimeLimit
+
+import tasks
+from lbw_minimal import sac_ae
+from lbw_minimal.replay import FrameBuffer
+from lbw_minimal.sac_ae import SACAE, SIZES, train
+from lbw_minimal.sac_ae_networks import Decoder, Encoder, Patches
+from lbw_minimal.training import Checkpoint, InputError, save_state
+
+SHAPE = (84, 84, 3)
+
+
+def frames_of(n, seed=0):
+    return np.random.default_rng(seed).integers(0, 256, (n, 3, *SHAPE), np.uint8)
+
+
+def batch_of(n=4, seed=0):
+    g = torch.Generator().manual_seed(seed)
+    batch = {"obs": torch.from_numpy(frames_of(n, seed)), "reward": torch.randn(n, generator=g)}
+    batch |= {"next_obs": torch.from_numpy(frames_of(n, seed + 100)), "terminal": torch.zeros(n)}
+    return batch | {"action": torch.randn(n, 2, generator=g).tanh()}
+
+
+def small(**recipe):
+    torch.manual_seed(0)
+    return SACAE(2, **recipe)
+
+
+def values(module):
+    return [p.detach().clone() for p in module.parameters()]
+
+
+def equal(before, module):
+    return [torch.equal(p, q) for p, q in zip(before, module.parameters(), strict=True)]
+
+
+# Networks -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("size", "positions", "drawn"), [("slim", 21, (36, 21, 21)), ("published", 84, (9, 84, 84))]
+)
+def test_shapes(size, positions, drawn):
+    size = SIZES[size]
+    patches, frames = Patches(size.patch), torch.from_numpy(frames_of(2))
+    x = patches(frames)
+    h = Encoder(size)(x)
+    assert x.shape == (2, 27 * size.patch**2 // 3, positions, positions) and h.shape == (2, 50)
+    assert Decoder(size)(h).shape == patches.shrunk(x, size.shrink).shape == (2, *drawn)
+
+
+def test_the_published_size_is_that_of_the_publication():
+    agent = small(size="published")
+    convs = [m for m in agent.encoder.convs if isinstance(m, torch.nn.Conv2d)]
+    assert [c.stride[0] for c in convs] == [2, 1, 1, 1]
+    assert {c.out_channels for c in convs} == {32} and {c.kernel_size for c in convs} == {(3, 3)}
+    assert agent.critic.weights[0].shape == (2, 50 + 2, 1024) and agent.size.batch == 128
+    assert {"critic_loss", "reconstruction"} < set(agent.update(batch_of(2)))
+
+
+def test_a_patch_is_a_position_and_its_pixels_are_channels():
+    frames = torch.zeros(1, 3, *SHAPE)
+    frames[0, 2, 4 * 5 + 1, 4 * 7 + 3, 1] = 255  # frame 2, row 1 and column 3 of the patch, green
+    x = Patches(4)(frames)
+    (found,) = (x == 0.5).nonzero().tolist()
+    assert found == [0, 2 * 48 + 1 * 12 + 3 * 3 + 1, 5, 7] and x.min() == -0.5
+
+
+def test_the_decoder_draws_frames_of_half_the_size():
+    """Against torch's pooling of the frames themselves."""
+    frames = torch.from_numpy(frames_of(2))
+    patches = Patches(4)
+    drawn = patches.shrunk(patches(frames), 2).unflatten(1, (3, 2, 2, 3))  # (B, 3, 2, 2, 3, n, n)
+    drawn = drawn.permute(0, 1, 4, 5, 2, 6, 3).reshape(6, 3, 42, 42)
+    pixels = (frames.float() / 255 - 0.5).flatten(0, 1).permute(0, 3, 1, 2)
+    assert torch.allclose(drawn, torch.nn.functional.avg_pool2d(pixels, 2), atol=1e-6)
+
+
+def test_latents_are_within_one_and_tell_frames_apart():
+    agent = small()
+    h = agent.encoder(agent.normalise(batch_of()["obs"]))
+    assert h.abs().max() < 1 and (h[0] - h[1]).abs().max() > 0.01
+
+
+# One update: what moves what ----------------------------------------------------------------------
+
+
+def test_the_actors_loss_moves_neither_encoder_nor_critics():
+    """Two updates from one state, of which one lacks the gradient: only the actor differs."""
+    agent, batch = small(), batch_of()
+    y = agent.critic_target(batch)
+    agent.critic_target = lambda batch: y
+    agent.updates = 1
+    without = deepcopy(agent)
+    without._actor_gradient = lambda h: {}
+    agent.update(batch)
+    without.update(batch)
+    for name in ("encoder", "critic", "decoder"):
+        assert all(equal(values(getattr(without, name)), getattr(agent, name)))
+    assert not all(equal(values(without.actor.net), agent.actor.net))
+
+
+def test_the_critics_loss_trains_the_encoder():
+    agent = small()
+    agent.updates, before = 0, values(agent.encoder)
+    told = agent.update(batch_of())  # an odd update: critics alone
+    assert "reconstruction" not in told and "actor_loss" not in told
+    assert not any(equal(before, agent.encoder))
+
+
+def test_the_reconstruction_trains_encoder_and_decoder():
+    agent = small()
+    x = agent.normalise(batch_of()["obs"])
+    agent.reconstruction(agent.encoder(x), x).backward()
+    for module in (agent.encoder, agent.decoder):
+        assert all(p.grad.abs().sum() > 0 for p in module.parameters())
+    assert all(p.grad is None for p in agent.actor.net.parameters())
+
+
+def test_the_autoencoder_learns_from_reconstruction_and_penalty(monkeypatch):
+    """With a penalty large enough to be seen."""
+    monkeypatch.setattr(sac_ae, "LATENT_L2", 0.1)
+    agent, batch = small(), batch_of()
+    x = agent.normalise(batch["obs"])
+    h = agent.encoder(x)
+    loss = ((agent.decoder(h) - agent.normalise.shrunk(x, 2)) ** 2).mean()
+    loss = loss + 0.1 * (0.5 * (h**2).sum(1)).mean()
+    learnt = [*agent.encoder.parameters(), *agent.decoder.parameters()]
+    gradients, agent.updates = torch.autograd.grad(loss, learnt), 1
+    agent.update(batch)
+    for p, gradient in zip(learnt, gradients, strict=True):
+        assert torch.allclose(p.grad, gradient, atol=1e-6)
+
+
+def plain_update(agent, adams, batch, number):
+    """An update in plain lines: every loss has a pass, a gradient and an optimizer of its own."""
+    of_critic, of_actor, of_alpha, of_autoencoder = adams
+    x, y = agent.normalise(batch["obs"]), agent.critic_target(batch)
+    critic_loss = (agent.critic(x, batch["action"]) - y).square().mean(1).sum()
+    h = agent.encoder(x)
+    draws = (agent.decoder(h) - agent.normalise.shrunk(x, 2)).square().mean()
+    losses = [(of_critic, critic_loss, agent.critic.parameters())]
+    if number % 2 == 0:
+        a, log_pi = agent.actor.sample(x)
+        alpha = agent.log_alpha.exp()
+        actor_loss = (alpha.detach() * log_pi - agent.critic(x, a).amin(0)).mean()
+        alpha_loss = alpha * (-log_pi.detach().mean() - agent.target_entropy)
+        draws = draws + 1e-6 * (h.square().sum(1) / 2).mean()
+        parts = [*agent.encoder.parameters(), *agent.decoder.parameters()]
+        losses += [
+            (of_actor, actor_loss, agent.actor.net.parameters()),
+            (of_alpha, alpha_loss, [agent.log_alpha]),
+            (of_autoencoder, draws, parts),
+        ]
+    steps = []
+    for adam, loss, learnt in losses:
+        learnt = list(learnt)
+        steps.append((adam, learnt, torch.autograd.grad(loss, learnt, retain_graph=True)))
+    for adam, learnt, gradients in steps:
+        for p, gradient in zip(learnt, gradients, strict=True):
+            p.grad = gradient
+        adam.step()
+    with torch.no_grad():
+        for slow, fast, pace in (
+            (agent.target.encoder, agent.encoder, 0.05),
+            (agent.target.weights, agent.critic.weights, 0.01),
+            (agent.target.biases, agent.critic.biases, 0.01),
+            (agent.test_actor, agent.actor, 0.005),
+        ):
+            for p, q in zip(slow.parameters(), fast.parameters(), strict=True):
+                p += pace * (q - p)
+
+
+def test_the_shared_pass_is_that_of_four_optimizers_in_plain_lines():
+    fast = small()
+    plain = deepcopy(fast)
+    adams = [torch.optim.Adam(part, 1e-3) for part in (
+        plain.critic.parameters(), plain.actor.net.parameters(), [plain.log_alpha]
+    )]  # fmt: skip
+    decay = {"params": list(plain.decoder.parameters()), "weight_decay": 1e-7}
+    encoder = {"params": list(plain.encoder.parameters())}
+    adams.append(torch.optim.Adam([encoder, decay], 1e-3))
+    for number in range(1, 7):
+        batch, noise = batch_of(seed=number), torch.get_rng_state()
+        fast.update(batch)
+        torch.set_rng_state(noise)
+        plain_update(plain, adams, batch, number)
+    assert fast.log_alpha.item() == pytest.approx(plain.log_alpha.item(), abs=1e-6)
+    for name in ("actor", "critic", "target", "test_actor", "decoder"):
+        pairs = zip(values(getattr(fast, name)), values(getattr(plain, name)), strict=True)
+        for p, q in pairs:
+            torch.testing.assert_close(p, q, atol=2e-5, rtol=0)
+
+
+def test_the_penalties_are_the_publications_and_decay_is_the_decoders_alone():
+    agent = small()
+    assert (sac_ae.LATENT_L2, sac_ae.DECODER_DECAY) == (1e-6, 1e-7)
+    groups = agent.optimizer.param_groups + agent.autoencoder.param_groups
+    of_decoder = {id(p) for p in agent.decoder.parameters()}
+    decayed = {id(p) for g in groups for p in g["params"] if g["weight_decay"] == 1e-7}
+    assert decayed == of_decoder
+    assert {g["weight_decay"] for g in groups} == {0, 1e-7}
+
+
+def test_all_learning_rates_fall_together():
+    agent = small(critic_lr=2e-3, actor_lr=1e-3)
+    agent.anneal(0.65)
+    groups = agent.optimizer.param_groups + agent.autoencoder.param_groups
+    assert [g["lr"] for g in groups] == pytest.approx([1e-3, 5e-4, 1e-3, 1e-3])
+
+
+def test_target_encoder_critics_and_averaged_actor_each_follow_at_their_pace():
+    agent = small(tau=0.01, tau_encoder=0.05, average=0.005)
+    parts = {
+        0.05: (agent.target.encoder, agent.encoder),
+        0.01: (agent.target.weights, agent.critic.weights),
+        0.005: (agent.test_actor, agent.actor),
+    }
+    old = {pace: values(slow) for pace, (slow, _) in parts.items()}
+    for p in agent.critic.parameters():
+        p.data += 1.0  # far enough that paces show
+    agent.update(batch_of())
+    for pace, (slow, fast) in parts.items():
+        for before, p, q in zip(old[pace], slow.parameters(), fast.parameters(), strict=True):
+            assert torch.allclose(p, before + pace * (q - before), atol=1e-5)
+
+
+def test_the_target_reads_latents_of_the_targets_encoder():
+    agent, batch = small(), batch_of()
+    torch.manual_seed(1)
+    before = agent.critic_target(batch)
+    for p in agent.target.encoder.parameters():
+        p.data.mul_(-2)
+    torch.manual_seed(1)
+    assert not torch.isclose(agent.critic_target(batch), before).all()
+
+
+def test_the_actor_learns_every_second_update():
+    agent, moved = small(), []
+    for seed in range(4):
+        before = values(agent.actor.net)
+        agent.update(batch_of(seed=seed))
+        moved.append(not all(equal(before, agent.actor.net)))
+    assert moved == [False, True, False, True]
+
+
+def test_the_reconstruction_learns_toy_frames():
+    """Bars at four places: 80 steps of the decoder halve the error of the best constant picture."""
+    frames = np.zeros((4, 3, *SHAPE), np.uint8)
+    for i in range(4):
+        frames[i, :, 20:60, 20 * i : 20 * i + 24] = 255
+    agent, frames = small(critic_lr=3e-3), torch.from_numpy(frames)
+    batch = batch_of() | {"obs": frames, "next_obs": frames}
+    told = [agent.update(batch) for _ in range(160)]
+    x = agent.normalise(frames)
+    constant = agent.normalise.shrunk(x, 2).var(0, correction=0).mean()
+    assert told[1]["reconstruction"] > constant > 2 * told[-1]["reconstruction"]
+
+
+# The buffer of frames -----------------------------------------------------------------------------
+
+
+class Count(gym.Env):
+    """Frames of one brightness: 1 at the start of the first episode, then 2, 3, ..."""
+
+    observation_space = gym.spaces.Box(0, 255, (2, 2, 3), np.uint8)
+    action_space = gym.spaces.Box(-1, 1, (2,), np.float32)
+    shown = 0
+
+    def reset(self, seed=None, options=None):
+        super().reset(seed=seed)
+        return self._show(), {}
+
+    def step(self, action):
+        return self._show(), float(self.shown), False, False, {}
+
+    def _show(self):
+        self.shown += 1
+        return np.full((2, 2, 3), self.shown, np.uint8)
+
+
+def filled(path=None, capacity=40):
+    """A buffer with episodes of 1, 2 and 5 steps, and the transitions that went in."""
+    env, buffer, given = (
+        FrameStackObservation(Count(), 3),
+        FrameBuffer((2, 2, 3), 2, capacity, path),
+        [],
+    )
+    for length in (1, 2, 5):
+        obs, _ = env.reset()
+        for t in range(length):
+            action = np.full(2, len(given) / 10, np.float32)
+            next_obs, reward, *_ = env.step(action)
+            terminal = float(t == length - 1)
+            buffer.add(
+                first=t == 0, obs=obs, action=action, reward=reward, next_obs=next_obs,
+                terminal=terminal,
+            )  # fmt: skip
+            given.append((obs.copy(), action, reward, next_obs.copy(), terminal))
+            obs = next_obs
+    return buffer, given
+
+
+def test_what_is_drawn_is_what_went_in_at_starts_and_ends_of_episodes_too():
+    """The reward names the transition. All eight of them are drawn."""
+    buffer, given = filled()
+    batch, seen = buffer.sample(np.random.default_rng(0), 200), set()
+    for i in range(200):
+        (j,) = (j for j, kept in enumerate(given) if kept[2] == batch["reward"][i])
+        for name, kept in zip(
+            ("obs", "action", "reward", "next_obs", "terminal"), given[j], strict=True
+        ):
+            assert (batch[name][i].numpy() == kept).all(), name
+        seen.add(j)
+    assert seen == set(range(8)) and batch["obs"].dtype == torch.uint8
+
+
+def test_a_frame_is_kept_once():
+    """Eight steps in three episodes have eleven frames, though their stacks have 48."""
+    buffer, _ = filled()
+    assert len(buffer) == 8 and buffer.kept == 11
+
+
+def test_a_full_buffer_says_so():
+    with pytest.raises(IndexError):
+        filled(capacity=10)
+
+
+@pytest.mark.parametrize("in_file", [True, False])
+def test_the_buffer_comes_back_and_its_frames_stay_in_their_file(tmp_path, in_file):
+    path = tmp_path / "policy.frames" if in_file else None
+    buffer, _ = filled(path)
+    state = buffer.state_dict()
+    assert ("frames" in state) != in_file
+    save_state(tmp_path / "state", state)
+    again = FrameBuffer((2, 2, 3), 2, 40, path)
+    again.load_state_dict(sac_ae.load_state(tmp_path / "state"))
+    one, two = (b.sample(np.random.default_rng(0), 50) for b in (buffer, again))
+    assert all(torch.equal(one[k], two[k]) for k in one) and again.kept == 11
+
+
+def test_lost_frames_are_noticed(tmp_path):
+    buffer, _ = filled(tmp_path / "policy.frames")
+    save_state(tmp_path / "state", buffer.state_dict())
+    (tmp_path / "policy.frames").unlink()
+    again = FrameBuffer((2, 2, 3), 2, 40, tmp_path / "policy.frames")
+    with pytest.raises(InputError, match=r"policy\.frames: lost beside its checkpoint"):
+        again.load_state_dict(sac_ae.load_state(tmp_path / "state"))
+
+
+# Training and files -------------------------------------------------------------------------------
+
+
+class Dot(gym.Env):
+    """A white square that moves sideways is paid for standing in the middle; 10 steps."""
+
+    observation_space = gym.spaces.Box(0, 255, SHAPE, np.uint8)
+    action_space = gym.spaces.Box(-1, 1, (1,), np.float32)
+
+    def reset(self, seed=None, options=None):
+        super().reset(seed=seed)
+        self.x = self.np_random.uniform(-1, 1)
+        return self._show(), {}
+
+    def step(self, action):
+        self.x = float(np.clip(self.x + 0.3 * action[0], -1, 1))
+        return self._show(), -abs(self.x), False, False, {"is_success": abs(self.x) < 0.2}
+
+    def _show(self):
+        frame = np.zeros(SHAPE, np.uint8)
+        left = round(34 * (1 + self.x))
+        frame[34:50, left : left + 16] = 255
+        return frame
+
+
+def dot(env=None):
+    return FrameStackObservation(TimeLimit(env or Dot(), 10), 3)
+
+
+class Stop(Exception):
+    """Where a test cuts a training off."""
+
+
+def test_a_resumed_run_ends_as_the_uninterrupted_one(tmp_path):
+    """Cut off in the fifth episode; the checkpoint before it is odd in updates."""
+    recipe = dict(steps=50, seed=3, random_steps=25)
+    whole, log = train(dot(), **recipe)
+
+    class Cut(Dot):
+        def reset(self, seed=None, options=None):
+            self.episodes = getattr(self, "episodes", 0) + 1
+            if self.episodes == 5:
+                raise Stop
+            return super().reset(seed=seed)
+
+    path = tmp_path / "policy.checkpoint"
+    with pytest.raises(Stop):
+        train(dot(Cut()), checkpoint=Checkpoint(path, seconds=0), **recipe)
+    resumed, log_2 = train(dot(), checkpoint=Checkpoint(path), **recipe)
+    assert log_2 == log and {"reconstruction", "actor_loss", "q"} < set(log[-1])
+    for name in ("actor", "critic", "target", "decoder", "test_actor"):
+        assert all(equal(values(getattr(whole, name)), getattr(resumed, name))), name
+
+
+def test_a_checkpoint_holds_no_frames(tmp_path):
+    """70 steps more are 1.6 MB of frames, in their file and not in the checkpoint."""
+    path, sizes = tmp_path / "policy.checkpoint", []
+    for steps in (20, 90):
+        train(dot(), steps=steps, seed=0, random_steps=500, checkpoint=Checkpoint(path))
+        sizes.append(path.stat().st_size)
+        path.unlink()
+    assert sizes[1] - sizes[0] < 100_000
+
+
+def test_a_saved_policy_acts_as_before_and_brings_its_encoder(tmp_path):
+    agent, obs = small(), frames_of(1)[0]
+    for seed in range(4):
+        agent.update(batch_of(seed=seed))
+    sac_ae.save(tmp_path / "policy.safetensors", agent)
+    loaded = sac_ae.load(tmp_path / "policy.safetensors")
+    action = agent.act(obs, deterministic=True)
+    assert (loaded.act(obs, deterministic=True) == action).all() and action.shape == (2,)
+    assert loaded.sizes == {"action_dim": 2, "size": "slim"}
+    assert (loaded.act(255 - obs, deterministic=True) != action).any()
+    sac_ae.save(tmp_path / "again.safetensors", loaded)
+    first, second = (tmp_path / f"{name}.safetensors" for name in ("policy", "again"))
+    assert first.read_bytes() == second.read_bytes()
+
+
+def test_other_files_frames_and_sizes_are_refused(tmp_path):
+    save_state(tmp_path / "keypoints.safetensors", {"kind": "policy"})
+    with pytest.raises(InputError, match=r"keypoints\.safetensors: not a policy from pixels"):
+        sac_ae.load(tmp_path / "keypoints.safetensors")
+    with pytest.raises(InputError, match="wrap the environment in FrameStackObservation"):
+        train(Dot(), steps=10, seed=0)
+    with pytest.raises(InputError, match="size 'large': choose one of slim, published"):
+        train(dot(), steps=10, seed=0, size="large")
+
+
+class Distance(gym.Wrapper):
+    """Pays -4 m^-1 times the true distance, which no method may see."""
+
+    def step(self, action):
+        obs, _, terminal, late, info = self.env.step(action)
+        return obs, -4 * self.env.unwrapped.distance(), terminal, late, info
+
+
+@pytest.mark.slow
+def test_it_learns_reach_from_pixels(capsys):
+    """TODO"""
+    env = Distance(gym.make(tasks.id_of("reach"), jitter=0.005))
+    env, start = FrameStackObservation(env, 3), time.monotonic()
+    agent, _ = train(env, steps=1500, seed=0)
+    successes = 0
+    for seed in range(20):
+        obs, _ = env.reset(seed=1000 + seed)
+        ended = False
+        while not ended:
+            action = agent.act(obs, deterministic=True)
+            obs, _, terminal, late, info = env.step(action)
+            ended = terminal or late
+        successes += info["is_success"]
+    with capsys.disabled():
+        print(f"\nreach from pixels: {successes}/20 after {time.monotonic() - start:.0f} s")
+    assert successes >= 18
