@@ -45,6 +45,10 @@ class Recipe:
     policy_steps: int = 3_000  # environment steps of SAC
     updates: int = 2  # of SAC's networks, an environment step
     entropy: float = -1.0  # SAC's target at first, per number of an action; it falls to -3.5
+    # The rivals' alone, see `rivals.py`.
+    classifier_iterations: int = 10_000
+    clip: float = 10.0  # of the classifier's logit
+    pixel_updates: int = 1  # of SAC+AE's networks, an environment step
 
 
 @dataclass

@@ -45,7 +45,10 @@ def main(argv: list[str]) -> None:
         ours = {f"{task} (ours)": env_steps(our_env(task, filmed)) for task in ("push", *TASKS)}
         contest(what, ours | peers(filmed), seconds)
     frames = np.random.default_rng(0).integers(0, 256, (64, 84, 84, 3), np.uint8)
-    translations = {"MUNIT (ours)": munit.train, "CycleGAN (ours)": cyclegan.train}
+    translations: dict[str, Callable[..., Any]] = {
+        "MUNIT (ours)": munit.train,
+        "CycleGAN (ours)": cyclegan.train,
+    }
     ours = {name: iterations(train, frames, frames) for name, train in translations.items()}
     contest("an iteration of a translation", ours, seconds)
     contest(

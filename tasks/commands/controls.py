@@ -100,7 +100,8 @@ def play(
     whole: go on to its end even if the task is done before.
     """
     first, _ = env.reset(seed=seed)
-    obs, actions, total, done, ended = first, [], 0.0, False, False
+    actions: list[np.ndarray] = []
+    obs, total, done, ended = first, 0.0, False, False
     while not ended:
         actions.append(robot(obs, len(actions)))
         obs, reward, terminated, truncated, info = env.step(actions[-1])
@@ -148,7 +149,7 @@ def compare(task: str, weights: Path, jitter: float, episodes: int, seed: int) -
     found["looks once, then replays"] = wins(env, looks, episodes)
     env.close()
 
-    blind = gym.make(tasks.id_of(task), jitter=jitter, observation="state")
+    blind: gym.Env = gym.make(tasks.id_of(task), jitter=jitter, observation="state")
     blind = TimeLimit(blind, reward.episode)  # whose true state no blind robot reads
     _, _, _, actions = max(done, key=lambda episode: episode[1])
     directions = [d for d in itertools.product((-1, 0, 1), repeat=3) if d[1] == 0 and any(d)]

@@ -18,7 +18,8 @@ import tasks
 from lbw_minimal import sac, video
 from lbw_minimal.imitate import watched
 from lbw_minimal.pictures import data_uri, draw_keypoints, film, picture
-from lbw_minimal.report import CSS, demonstration
+from lbw_minimal.report import demonstration
+from lbw_minimal.report_texts import CSS
 from lbw_minimal.training import write_atomic
 from tasks.commands import Parser, make_folder
 from tasks.commands.viewer import perform

@@ -19,12 +19,13 @@ import numpy as np
 import torch
 
 import tasks
-from lbw_minimal import sac, video
+from lbw_minimal import classifier, cyclegan, sac, sac_ae, video
 from lbw_minimal.imitate import Perception, Recipe, Run, load_perception
 from lbw_minimal.reward import MENDS
 from lbw_minimal.training import InputError, pick_device, write_atomic
 from tasks.commands import JITTER, Parser, at_least, make_folder, metres
 
+EXPERTS = 15  # human videos of a task, as many as AVID-m learns from in the paper
 TEST_EPISODES = 10  # as in the paper
 RESULTS = ("*.checkpoint", "*.frames", "*.safetensors", "*_log.json", "metrics.json", "report.html")
 FAST = {
@@ -33,17 +34,23 @@ FAST = {
     "transporter_iterations": 30,
     "policy_steps": 1000,
     "robot_frames": 200,
+    "classifier_iterations": 200,
 }
-PERCEPTION = (
-    "robot_frames", "munit_iterations", "munit_width",
-    "transporter_iterations", "K", "shift", "hue",
-)  # fmt: skip
+TRANSLATION = ("robot_frames", "munit_iterations", "munit_width")
+PERCEPTION = (*TRANSLATION, "transporter_iterations", "K", "shift", "hue")
+RIVALS = ("classifier_iterations", "clip", "pixel_updates")  # fields that only they have
+METHODS = {  # and the fields of the recipe that each of them has
+    "lbw": (*PERCEPTION, "policy_steps", "updates", "entropy"),
+    "avid": (*TRANSLATION, *RIVALS, "policy_steps", "entropy"),
+    "classifier": (*RIVALS, "policy_steps", "entropy"),
+}
 
 
 def parser(name: str) -> Parser:
     """The arguments of a run of the task `name`."""
     p = Parser(name, "Learn a task from its human video, test the policy, and write a report.")
     add = p.add_argument
+    add("--method", choices=METHODS, default="lbw", help="avid, classifier: the paper's rivals")
     add("--video", type=Path, metavar="FILE", help="another human video, as the whole human domain")
     add("--from-scratch", action="store_true", help="train perception too")
     add("--reward", choices=("mended", "literal"), default="mended", help="literal: Eq. 8-10")
@@ -70,42 +77,47 @@ class Job:
     args: argparse.Namespace
     recipe: Recipe
     from_scratch: bool
-    demo: np.ndarray  # the human video, (N, 84, 84, 3) uint8
+    experts: list[np.ndarray]  # human videos of the task, (N, 84, 84, 3) uint8 each
     random: np.ndarray  # random human motion, same type; empty with the user's own video
     trained: Perception | None  # None if perception is to be learnt
     weights: Path  # folder of trained weights
     command: str  # what makes this run again
     run: Run
 
+    @property
+    def demo(self) -> np.ndarray:
+        """The one human video that LbW learns from, (N, 84, 84, 3) uint8."""
+        return self.experts[0]
+
 
 def check(name: str, args: argparse.Namespace, argv: list[str]) -> Job:
     """Look at everything the user gave before anything is written."""
-    from_scratch = args.from_scratch or args.fast or args.video is not None
+    lbw = args.method == "lbw"
+    from_scratch = lbw and (args.from_scratch or args.fast or args.video is not None)
     refuse_idle_options(args, from_scratch)
     module = tasks.module(name)
     recipe = dataclasses.replace(module.RECIPE, **FAST) if args.fast else module.RECIPE
-    recipe = dataclasses.replace(recipe, **read_settings(args.set, from_scratch))
+    recipe = dataclasses.replace(recipe, **read_settings(args.set, args.method, from_scratch))
     pick_device(args.device or "cpu")
     torch.set_num_threads(args.threads or os.cpu_count() or 1)
 
-    demo, warnings = video.read(args.video or tasks.VIDEOS / name / "expert_01.mp4")
-    for warning in warnings:
-        print(f"warning: {warning}", file=sys.stderr)
-    random = demo[:0] if args.video else video.read(tasks.VIDEOS / name / "random.mp4")[0]
+    experts = [read_video(path) for path in videos(name, args)]
+    random = experts[0][:0] if args.video else read_video(tasks.VIDEOS / name / "random.mp4")
     weights = args.weights or tasks.WEIGHTS / name
-    perception = None if from_scratch else load_perception(weights, name)
+    perception = load_perception(weights, name) if lbw and not from_scratch else None
     if args.evaluate:
-        sac.load(weights / "policy.safetensors")
+        check_weights(weights, name, args.method)
 
     settings = {
         "task": name,
         "seed": args.seed,
+        "method": args.method,
         "reward": args.reward,
         "without": args.without,
         "fast": args.fast,
         "from_scratch": from_scratch,
         "jitter": args.jitter,
-        "video": hashlib.sha256(demo.tobytes()).hexdigest()[:16],
+        "video": hashlib.sha256(b"".join(v.tobytes() for v in experts)).hexdigest()[:16],
         "set": sorted(args.set),
         "recipe": dataclasses.asdict(recipe),
     }
@@ -115,7 +127,34 @@ def check(name: str, args: argparse.Namespace, argv: list[str]) -> Job:
     run.metrics["settings"] = settings
     machine = f"{platform.machine()}, {os.cpu_count()} cores, torch {torch.__version__}"
     run.metrics["machine"] = machine
-    return Job(name, args, recipe, from_scratch, demo, random, perception, weights, command, run)
+    return Job(name, args, recipe, from_scratch, experts, random, perception, weights, command, run)
+
+
+def videos(name: str, args: argparse.Namespace) -> list[Path]:
+    """Files of the human videos that the method learns from, the demonstration first."""
+    if args.video:
+        return [args.video]
+    count = {"lbw": 1, "avid": EXPERTS, "classifier": 0}[args.method]  # the last films the robot
+    return [tasks.VIDEOS / name / f"expert_{i + 1:02d}.mp4" for i in range(count)]
+
+
+def read_video(path: Path) -> np.ndarray:
+    """The frames (T, 84, 84, 3) uint8 of a file; what is odd about it is said."""
+    frames, warnings = video.read(path)
+    for warning in warnings:
+        print(f"warning: {warning}", file=sys.stderr)
+    return frames
+
+
+def check_weights(weights: Path, name: str, method: str) -> None:
+    """Raise InputError unless the folder `weights` holds what a replay of the method takes."""
+    if method == "lbw":
+        sac.load(weights / "policy.safetensors")
+        return
+    sac_ae.load(weights / "policy.safetensors")
+    classifier.load(weights / "classifier.safetensors", name)
+    if method == "avid":
+        cyclegan.load(weights / "translation.safetensors", name)
 
 
 def refuse_idle_options(args: argparse.Namespace, from_scratch: bool) -> None:
@@ -126,11 +165,20 @@ def refuse_idle_options(args: argparse.Namespace, from_scratch: bool) -> None:
         idle = [("--from-scratch", args.from_scratch, why), ("--video", args.video, why),
                 ("--set", args.set, why), ("--fast", args.fast, why),
                 ("--resume", args.resume, why)]  # fmt: skip
-    if args.reward == "literal":
+    if args.method != "lbw":
+        why = f"--method {args.method} has no keypoints and learns its reward anew"
+        idle += [("--from-scratch", args.from_scratch, why), ("--without", args.without, why),
+                 ("--reward", args.reward == "literal", why)]  # fmt: skip
+        idle += [("--video", args.video, "the rivals learn from many videos")]
+        if not args.evaluate:
+            idle += [("--weights", args.weights, "a rival trains all of them anew")]
+        elif args.weights is None:
+            raise InputError("--evaluate: the kit has no rivals' weights; name a run by --weights.")
+    elif args.reward == "literal":
         idle += [("--without", args.without, "the literal reward has no mends")]
     if from_scratch:
         idle += [("--weights", args.weights, "perception is trained anew here")]
-    else:
+    elif args.method == "lbw":
         idle += [("--device", args.device, "only perception learns there; add --from-scratch")]
     for option, given, why in idle:
         if given:
@@ -144,18 +192,20 @@ def refuse_idle_options(args: argparse.Namespace, from_scratch: bool) -> None:
             raise InputError(f"{option}{value} does nothing here: {why}.")
 
 
-def read_settings(given: list[str], from_scratch: bool) -> dict[str, Any]:
+def read_settings(given: list[str], method: str, from_scratch: bool) -> dict[str, Any]:
     """The recipe's fields that `--set NAME=VALUE` names, with values of the fields' types."""
     fields = {field.name: field for field in dataclasses.fields(Recipe)}
-    del fields["human_frames"]  # `record` films so many; here the videos have what they have
+    # `record` films so many human frames; here the videos have what they have.
+    fields = {name: fields[name] for name in fields if name in METHODS[method]}
     out = {}
     for text in given:
         name, _, value = text.partition("=")
         if name not in fields:
             raise InputError(
-                f"--set {text}: the recipe has no {name!r}; it has {', '.join(fields)}."
+                f"--set {text}: the recipe of --method {method} has no {name!r}; "
+                f"it has {', '.join(fields)}."
             )
-        if name in PERCEPTION and not from_scratch:
+        if method == "lbw" and name in PERCEPTION and not from_scratch:
             raise InputError(f"--set {text}: perception is not trained here; add --from-scratch.")
         out[name] = read_number(text, value, whole=fields[name].type == "int")
     return out

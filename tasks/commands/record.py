@@ -13,8 +13,7 @@ import numpy as np
 
 import tasks
 from lbw_minimal import video
-from tasks.commands import Parser
-from tasks.commands.run import JITTER
+from tasks.commands import JITTER, Parser
 from tasks.world import Recording, expert_takes, random_takes, save_recordings
 from tasks.world.scene import FPS
 

@@ -18,7 +18,7 @@ import torch
 from gymnasium.spaces import Box
 
 import tasks
-from lbw_minimal import sac
+from lbw_minimal import classifier, cyclegan, rivals, sac
 from lbw_minimal.imitate import PACE, Perception, imitate, learn_perception
 from lbw_minimal.report import wilson, write_report
 from lbw_minimal.training import InputError, seed_everything
@@ -33,10 +33,14 @@ TEST_SEED = 1_000_000  # first seed of the test episodes, far from those of trai
 def main(name: str, argv: list[str]) -> None:
     """Run the task `name` with these arguments. Raises InputError for a mistake in them."""
     job = check(name, parser(name).read(argv), argv)
-    perception, robot = perceive(job)
-    agent, env = learn(job, perception, robot)
+    if job.args.method == "lbw":
+        perception, robot = perceive(job)
+        agent, env = learn(job, perception, robot)
+        seen = {"demo": job.demo, "translated": perception.translated, "z_demo": perception.z_E}
+    else:
+        agent, env, seen = rival(job)
     first, scene = test(job, agent, env)
-    report(job, perception, first, scene)
+    report(job, seen, first, scene)
 
 
 def perceive(job: Job) -> tuple[Perception, np.ndarray]:
@@ -45,12 +49,8 @@ def perceive(job: Job) -> tuple[Perception, np.ndarray]:
     Returns perception and the film (M, 84, 84, 3) uint8: what it learns from, or as much as shows
     the robot's pace.
     """
-    start, seed = time.monotonic(), job.args.seed
-    film_env = tasks.bare(job.name)
-    most = job.recipe.robot_frames
-    robot, _ = record_random(film_env, most if job.from_scratch else min(PACE, most), seed=seed)
-    film_env.close()
-    job.run.metrics["stages"]["robot_video"] = round(time.monotonic() - start, 1)
+    seed, most = job.args.seed, job.recipe.robot_frames
+    robot = film_robot(job, most if job.from_scratch else min(PACE, most))
     perception = job.trained
     if perception is None:
         seed_everything(seed)
@@ -65,6 +65,39 @@ def perceive(job: Job) -> tuple[Perception, np.ndarray]:
         job.run.metrics["perception"] = found
         job.run.save()
     return perception, robot
+
+
+def film_robot(job: Job, frames: int) -> np.ndarray:
+    """Random robot motion, (frames, 84, 84, 3) uint8; the time it takes goes to the metrics."""
+    start = time.monotonic()
+    env = tasks.bare(job.name)
+    robot, _ = record_random(env, frames, seed=job.args.seed)
+    env.close()
+    job.run.metrics["stages"]["robot_video"] = round(time.monotonic() - start, 1)
+    return robot
+
+
+def rival(job: Job) -> tuple[sac.Policy, gym.Env, dict[str, Any]]:
+    """A rival's policy, its environment, and what its classifier was shown, for the report."""
+    recipe, run, device = job.recipe, job.run, job.args.device or "cpu"
+    if job.args.evaluate:
+        for file in job.weights.glob("*.safetensors"):
+            shutil.copy(file, run.out / file.name)
+    env = gym.make(tasks.id_of(job.name), jitter=job.args.jitter)
+    common = {"task": job.name, "seed": job.args.seed, "run": run, "device": device}
+    if job.args.method == "classifier":
+        start = time.monotonic()
+        shown = [frames for frames, _ in tasks.robot_experts(job.name, job.args.jitter)]
+        run.metrics["stages"]["robot_experts"] = round(time.monotonic() - start, 1)
+        agent, env = rivals.classifier_reward(env, shown, recipe, **common)
+        seen: dict[str, Any] = {"demo": shown[0]}
+    else:
+        robot = film_robot(job, recipe.robot_frames)
+        agent, env = rivals.avid_m(env, job.experts, job.random, robot, recipe, **common)
+        G = cyclegan.load(run.out / "translation.safetensors", job.name)
+        seen = {"demo": job.demo, "translated": cyclegan.translate(G, job.demo)}
+    model = classifier.load(run.out / "classifier.safetensors", job.name)
+    return agent, env, seen | {"logits": classifier.logits(model, [*seen.values()][-1])}
 
 
 def learn(job: Job, perception: Perception, robot: np.ndarray) -> tuple[sac.Policy, gym.Env]:
@@ -134,16 +167,14 @@ def evaluate(agent: sac.Policy, env: gym.Env, n: int) -> tuple[list[dict], dict[
     return rows, {"frames": np.stack(film), "z": np.stack(zs), "parts": parts}, scene
 
 
-def report(job: Job, perception: Perception, first: dict[str, Any], scene: str) -> None:
-    """Write the page of the run and print its result."""
+def report(job: Job, seen: dict[str, Any], first: dict[str, Any], scene: str) -> None:
+    """Write the page of the run and print its result; seen: what its first section shows."""
     out, metrics = job.run.out, job.run.metrics
     log = out / "policy_log.json"
     write_report(
         out / "report.html",
         task=job.name,
-        demo=job.demo,
-        translated=perception.translated,
-        z_demo=perception.z_E,
+        **seen,
         log=json.loads(log.read_text()) if log.exists() else [],  # a replayed policy has none
         episode=first,
         metrics=metrics,

@@ -1,0 +1,179 @@
+"""What the page of a run says, and its style sheet.
+
+Texts that depend on the method have its name as a key; where both rivals share one, it is "rival".
+"""
+
+from __future__ import annotations
+
+CSS = """
+:root { color-scheme: light }
+* { box-sizing: border-box }
+body { margin: 0 auto; max-width: 56rem; padding: 1rem 1rem 4rem; background: #fff; color: #1b1b1b;
+       font: 1rem/1.55 system-ui, sans-serif }
+h1 { font-size: 1.9rem; line-height: 1.2; margin: 1rem 0 .5rem }
+h2 { font-size: 1.25rem; margin: 2.6rem 0 .4rem; border-top: 1px solid #ddd; padding-top: 1.2rem }
+p, ol { max-width: 44rem; margin: .5rem 0 }
+img, iframe { max-width: 100%; border: 0; display: block }
+iframe { width: 100%; height: min(26rem, 65vh) }
+.tiles, .row { display: flex; flex-wrap: wrap; gap: .75rem; margin: 1rem 0 }
+.tiles div { flex: 1 1 8rem; background: #f2f4f7; border-radius: 8px; padding: .6rem .9rem }
+.tiles b { display: block; font-size: 1.35rem }
+.tiles span, figcaption, .small { color: #555; font-size: .85rem }
+.row > img { flex: 1 1 20rem; min-width: 0 }
+.strip { display: grid; grid-template-columns: repeat(8, 1fr); gap: .5rem .3rem; margin: 1rem 0 }
+@media (max-width: 40rem) { .strip { grid-template-columns: repeat(4, 1fr) } }
+.strip figure { margin: 0; text-align: center }
+.strip img { width: 100% }
+.note { background: #fff3d6; border-left: 4px solid #E69F00; padding: .5rem .9rem }
+table { border-collapse: collapse; margin: .8rem 0; font-size: .92rem; display: block;
+        overflow-x: auto }
+th, td { text-align: left; padding: .25rem 1.1rem .25rem 0; border-bottom: 1px solid #e4e4e4 }
+pre { white-space: pre-wrap; background: #f2f4f7; border-radius: 8px; padding: .7rem .9rem;
+      overflow-x: auto }
+@media print { .scene { display: none } h2, figure, img, tr { break-inside: avoid } }
+"""
+
+HTML = """<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<title>{title}</title>
+<style>{css}</style>
+</head>
+<body>
+{body}
+</body>
+</html>
+"""
+
+INTRODUCTION = {
+    "lbw": """
+<p>A human arm did the task once, in front of a camera. From that video a robot is to learn
+it:</p>
+<ol>
+<li>A first network <b>translates</b> the video: it repaints the human arm as the robot's.</li>
+<li>A second one finds <b>keypoints</b> on the translated video: a few spots that follow arm and
+object. Nobody told it which.</li>
+<li>The robot tries, over and over. The nearer its own keypoints come to the demonstrated ones,
+the higher its <b>reward</b>.</li>
+</ol>
+<p>No action of the human was recorded, and nobody told the robot what success is.</p>
+""",
+    "avid": """
+<p>AVID-m, a rival in the paper. A human arm did the task fifteen times in front of a camera:</p>
+<ol>
+<li>A first network, CycleGAN, <b>translates</b> the videos: it repaints the human arm as the
+robot's.</li>
+<li>A second one, the <b>goal classifier</b>, learns to tell the last tenth of the translated videos
+from the rest.</li>
+<li>The robot tries, over and over. The more its picture looks like an end to the classifier, the
+higher its <b>reward</b>. It sees whole pictures, no keypoints.</li>
+</ol>
+<p>No action of the human was recorded, and nobody told the robot what success is.</p>
+""",
+    "classifier": """
+<p>Classifier reward, a rival in the paper. The robot itself was led through the task thirty-five
+times, in front of its own camera:</p>
+<ol>
+<li>A network, the <b>goal classifier</b>, learns to tell the last tenth of these videos from the
+rest.</li>
+<li>The robot tries, over and over. The more its picture looks like an end to the classifier, the
+higher its <b>reward</b>. It sees whole pictures, no keypoints.</li>
+</ol>
+<p>No action was recorded. Nothing is translated either: this rival needs a robot that can do the
+task already.</p>
+""",
+}
+
+VIDEOS = {  # what each method learns from
+    "lbw": "one video",
+    "avid": "15 videos of a human",
+    "classifier": "35 videos of itself",
+}
+SHOWN = {
+    "lbw": "What the human showed, and what the robot saw in it",
+    "avid": "What the human showed, and what the classifier was shown",
+    "classifier": "What the classifier was shown",
+}
+
+DEMONSTRATION = {
+    "lbw": """
+<p>Above: the human video, from left to right. Below: the same moments as the translation network
+repaints them, with the keypoints found there. Look for two things. The robot's arm should stand
+where the human's does, and the object should still be there. A dot of one colour should stay on
+the same part of the arm, or on the object, in every column.</p>
+""",
+    "avid": """
+<p>Above: the first human video, from left to right. Below: the same moments as CycleGAN repaints
+them, and how likely the goal classifier takes each for an end (a logit: above 0 it says yes). Is
+the object still there, and is the arm where it should be?</p>
+""",
+    "classifier": """
+<p>The first video of the robot, from left to right, and how likely the goal classifier takes each
+moment for an end (a logit: above 0 it says yes).</p>
+""",
+}
+
+EPISODE = {
+    "lbw": """
+<p>The first test episode at half speed, as the robot's camera sees it. The numbered dots are the
+keypoints it steers by: all it knows of the scene.</p>
+""",
+    "rival": """
+<p>The first test episode at half speed, as the robot's camera sees it. It knows the last three of
+these pictures, and nothing else of the scene.</p>
+""",
+}
+
+PATHS = """
+<p>Dashed: where each keypoint went in the demonstration. Solid: where it goes in the robot's test
+episode, from the white dot to the numbered one. A solid line that runs along the dashed one of
+its colour is imitation. The robot keeps its own pace, so compare the shapes of the paths, and
+where they end.</p>
+"""
+
+SCENE = """
+<p>Drag to turn the scene, drag with the right button to shift it; after a click the wheel zooms.
+<i>Open Controls</i> stops the film and steps through it.</p>
+"""
+
+LEARNING = {
+    "lbw": """
+<p>Each grey dot is one attempt of the robot while it was learning, with some chance in its
+actions. Look for the blue line of the upper picture to climb towards 1. In the lower picture, a
+return nearer to 0 follows the demonstration more closely. The literal reward is Eq. 8-10 as the
+paper states them; the mended one adds what makes them learn. Success is only counted here; it is
+no part of the reward.</p>
+""",
+    "rival": """
+<p>Each grey dot is one attempt of the robot while it was learning, with some chance in its
+actions. Look for the blue line of the upper picture to climb towards 1. If the lower one climbs and
+the upper does not, the robot has found pictures that please the classifier and do not show the
+task. Success is only counted here; it is no part of the reward.</p>
+""",
+}
+
+REWARD = {
+    "lbw": """
+<p>The two parts of what the robot earned at each step of the test episode: r1 for being where the
+demonstration is, r2 for moving as the demonstration moves. In the sum r2 counts three times. Both
+are at most 0, and 0 means exactly as in the demonstration. Look for r1 to stay near 0, or to come
+back to it, until the end.</p>
+""",
+    "rival": """
+<p>The goal classifier's logit of the robot's picture at each step of the test episode, before it is
+clipped.</p>
+""",
+}
+
+PERCEPTION = """
+<p>How well the keypoints tell where things are: R² of a straight-line fit from them to the true
+pixel of the gripper's tip and of the object (1 is perfect), and in brackets the usual error in
+pixels. <i>robot</i>: on robot frames. <i>translated</i>: on translated human frames.
+<i>transfer</i>: the fit of the robot frames, used on translated ones. A dash: it did not
+move.</p>
+"""
+
+
+SMOKE = "This was a smoke run: no stage ran long enough to learn. Its figures say nothing."
