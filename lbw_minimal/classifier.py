@@ -34,6 +34,8 @@ SIDE = 48  # pixels of a side that the network sees; a frame has three times as 
 BATCH = 128  # images, half of them goals; the public code takes 128 of either
 LEARNING_RATE = 1e-4
 MIXUP = 1.0  # both parameters of the Beta distribution: any mixture is equally likely
+# Ours; the public code has none. Along push's robot videos logits stay within 4.4 (after 2,000
+# iterations), so it bounds only what an image unlike any video can be paid.
 CLIP = 10.0
 CHANNELS_LAST = torch.channels_last  # in memory; so few channels take 1.8 times as long otherwise
 LOG_EVERY = 100  # steps

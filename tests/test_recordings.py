@@ -7,7 +7,7 @@ import tasks
 from lbw_minimal import video
 from lbw_minimal.training import InputError
 from tasks.__main__ import main
-from tasks.commands.run import JITTER
+from tasks.commands import JITTER
 from tasks.world import (
     Recording,
     expert_takes,
