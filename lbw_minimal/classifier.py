@@ -91,7 +91,8 @@ class GoalClassifier(nn.Module):
             nn.Linear(8 * 12 * 12, 128),
             nn.ReLU(),
             nn.Linear(128, 1),
-        ).to(memory_format=CHANNELS_LAST)
+        )
+        self.to(memory_format=CHANNELS_LAST)  # type: ignore[call-overload]  # torch's stubs lack it
 
     def forward(self, images: torch.Tensor) -> torch.Tensor:
         """Logits (B,) of images (B, 3, 48, 48) in [-1, 1]."""

@@ -1,6 +1,5 @@
 """The tables: figures worked out by hand, finished runs left alone, failed ones named."""
 
-import dataclasses
 import json
 import shutil
 from importlib import import_module
@@ -12,6 +11,7 @@ from lbw_minimal.reward import MENDS
 from lbw_minimal.training import InputError
 from tasks import TASKS, WEIGHTS
 from tasks.commands import ablation, table
+from tasks.commands.job import fields_of
 
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / "solutions" / "results"
@@ -55,6 +55,38 @@ def test_row_has_the_rate_of_all_seeds_and_its_interval(runs):
     assert (runs / "table.md").read_text() == text
     rows = json.loads((runs / "table.json").read_text())
     assert len(rows) == 12 and rows[0]["wins"] == 10 and rows[0]["wins_at_end"] == 9
+
+
+def test_the_rivals_stand_above_lbw_as_in_the_paper(runs):
+    for task in ("push", "slide"):
+        for seed in range(2):
+            finish(table.folder(runs, task, seed, "classifier"), 3 * seed)
+            finish(table.folder(runs, task, seed, "avid"), 1)
+    *_, head, _, classifier, avid, lbw = table.table(runs, jobs=1, rivals=True).splitlines()
+    assert head == "| method | expert videos | push | slide | time |"
+    # 3 of 20: Wilson 5.2 to 36.0 %; 2 of 20: 2.8 to 30.1 %
+    rate = "15 % (5-36)"
+    assert classifier.startswith(
+        f"| Classifier reward | 35 robot videos | {rate} / 100 % | {rate} / 30 % |"
+    )
+    assert avid == (
+        "| AVID-m | 15 human videos | 10 % (3-30) / 60 % | 10 % (3-30) / 0 % | 0.4 h in 4 runs |"
+    )
+    assert lbw.startswith("| LbW | 1 human video | 97 % (83-99) / 100 % | 80 % (63-90) / 80 % |")
+
+
+def test_a_rival_is_run_alone_with_perception_of_its_own(tmp_path, monkeypatch):
+    started = []
+
+    def run(line, **_):
+        started.append(" ".join(line[3:]))
+        return type("Done", (), {"returncode": 0})
+
+    monkeypatch.setattr("subprocess.run", run)
+    table.run_missing(tmp_path, [("push", 1, "avid")], jobs=1, episodes=10)
+    (line,) = started
+    assert line.endswith("--method avid") and "--weights" not in line
+    assert f"--out {tmp_path / 'push-1-avid'}" in line
 
 
 def test_ablation_has_a_row_a_mend_and_a_picture(runs):
@@ -104,7 +136,7 @@ def test_shipped_policy_is_of_the_present_recipe(path):
     metrics = read(path)
     settings = metrics["settings"]
     recipe = import_module(f"tasks.{settings['task']}").RECIPE
-    assert settings["recipe"] == dataclasses.asdict(recipe)
+    assert settings["recipe"] == fields_of(recipe, "lbw")
     assert path.parent.name == f"{settings['task']}-{settings['seed']}"
     assert settings["reward"] == "mended" and not settings["without"] and not settings["set"]
     assert len(metrics["episodes"]) == 100

@@ -40,8 +40,8 @@ TRANSLATION = ("robot_frames", "munit_iterations", "munit_width")
 PERCEPTION = (*TRANSLATION, "transporter_iterations", "K", "shift", "hue")
 RIVALS = ("classifier_iterations", "clip", "pixel_updates")  # fields that only they have
 METHODS = {  # and the fields of the recipe that each of them has
-    "lbw": (*PERCEPTION, "policy_steps", "updates", "entropy"),
-    "avid": (*TRANSLATION, *RIVALS, "policy_steps", "entropy"),
+    "lbw": ("human_frames", *PERCEPTION, "policy_steps", "updates", "entropy"),
+    "avid": ("human_frames", *TRANSLATION, *RIVALS, "policy_steps", "entropy"),
     "classifier": (*RIVALS, "policy_steps", "entropy"),
 }
 
@@ -119,7 +119,7 @@ def check(name: str, args: argparse.Namespace, argv: list[str]) -> Job:
         "jitter": args.jitter,
         "video": hashlib.sha256(b"".join(v.tobytes() for v in experts)).hexdigest()[:16],
         "set": sorted(args.set),
-        "recipe": dataclasses.asdict(recipe),
+        "recipe": fields_of(recipe, args.method),
     }
     run = Run(prepare_folder(args.out or Path("runs") / name, settings, args.resume))
     command = shlex.join(["python", "-m", "tasks", name, *argv])
@@ -128,6 +128,11 @@ def check(name: str, args: argparse.Namespace, argv: list[str]) -> Job:
     machine = f"{platform.machine()}, {os.cpu_count()} cores, torch {torch.__version__}"
     run.metrics["machine"] = machine
     return Job(name, args, recipe, from_scratch, experts, random, perception, weights, command, run)
+
+
+def fields_of(recipe: Recipe, method: str) -> dict[str, Any]:
+    """What the method takes of the recipe."""
+    return {k: v for k, v in dataclasses.asdict(recipe).items() if k in METHODS[method]}
 
 
 def videos(name: str, args: argparse.Namespace) -> list[Path]:
@@ -195,8 +200,8 @@ def refuse_idle_options(args: argparse.Namespace, from_scratch: bool) -> None:
 def read_settings(given: list[str], method: str, from_scratch: bool) -> dict[str, Any]:
     """The recipe's fields that `--set NAME=VALUE` names, with values of the fields' types."""
     fields = {field.name: field for field in dataclasses.fields(Recipe)}
-    # `record` films so many human frames; here the videos have what they have.
-    fields = {name: fields[name] for name in fields if name in METHODS[method]}
+    fields = {name: fields[name] for name in fields_of(Recipe(0, 0), method)}
+    fields.pop("human_frames", None)  # `record` films so many; here the videos have what they have
     out = {}
     for text in given:
         name, _, value = text.partition("=")

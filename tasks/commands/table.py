@@ -1,7 +1,8 @@
 """The results of all tasks: what is missing is run first, what is finished is not repeated.
 
-`python -m tasks table`: the paper's Table II, LbW row, five tasks and three seeds, mended and
-literal reward. Out: Markdown and JSON in `runs/table/`, where every run has a folder of its own.
+`python -m tasks table`: LbW's row of the paper's Table II, five tasks and three seeds, mended and
+literal reward; with `--rivals` the whole table. Out: Markdown and JSON in `runs/table/`, where
+every run has a folder of its own.
 """
 
 from __future__ import annotations
@@ -22,7 +23,19 @@ from tasks.commands import Parser, at_least, make_folder
 from tasks.commands.job import TEST_EPISODES
 
 SEEDS = 3
-PAPER = {"reach": 100, "push": 100, "slide": 80, "coffee": 70, "drawer": 80}  # %, Table II
+RIVAL_SEEDS = 2
+RIVALS = ("classifier", "avid")
+METHODS = {  # name and number of expert videos, as in Table II
+    "classifier": ("Classifier reward", "35 robot videos"),
+    "avid": ("AVID-m", "15 human videos"),
+    "": ("LbW", "1 human video"),
+}
+TABLE_II = {  # %
+    "classifier": {"reach": 100, "push": 100, "slide": 30, "coffee": 50, "drawer": 70},
+    "avid": {"reach": 100, "push": 60, "slide": 0, "coffee": 40, "drawer": 50},
+    "": {"reach": 100, "push": 100, "slide": 80, "coffee": 70, "drawer": 80},
+}
+PAPER = TABLE_II[""]
 HEAD = [
     "task",
     "paper",
@@ -51,17 +64,19 @@ def parser(command: str = "table") -> Parser:
     p.add_argument(
         "--out", type=Path, default=Path("runs/table"), metavar="DIR", help="their folder"
     )
+    if command == "table":
+        p.add_argument("--rivals", action="store_true", help="the paper's rivals too, two seeds")
     return p
 
 
 def main(argv: list[str]) -> None:
     """Print the table, after running what is missing. Raises InputError if a run fails."""
     args = parser().read(argv)
-    print(table(args.out, args.jobs, args.episodes, args.seeds))
+    print(table(args.out, args.jobs, args.episodes, args.seeds, args.rivals))
 
 
 def folder(out: Path, task: str, seed: int, change: str = "") -> Path:
-    """The folder of a run; change: "" (the recipe), "literal", or the mend that is left out."""
+    """The folder of a run; change: "" (the recipe), "literal", a mend left out, or a rival."""
     return out / (f"{task}-{seed}-{change}" if change else f"{task}-{seed}")
 
 
@@ -76,7 +91,9 @@ def command(out: Path, task: str, seed: int, change: str, episodes: int) -> list
     path = folder(out, task, seed, change)
     args = [task, "--seed", str(seed), "--threads", "1", "--out", str(path)]
     args += ["--episodes", str(episodes)]
-    if not change:
+    if change in RIVALS:
+        args += ["--method", change]
+    elif not change:
         args.append("--from-scratch")
     else:
         args += ["--weights", str(folder(out, task, seed))]
@@ -103,9 +120,10 @@ def run_missing(out: Path, wanted: list[tuple[str, int, str]], jobs: int, episod
             raise InputError(f"{path}: the run ended with code {code}; see {log.name}.")
 
     make_folder(out)
-    bases = list(dict.fromkeys((task, seed, "") for task, seed, _ in wanted))
+    alone = ("", *RIVALS)  # the others learn on the perception of the unchanged run
+    bases = [(task, seed, c if c in alone else "") for task, seed, c in wanted]
     with ThreadPoolExecutor(jobs) as pool:
-        for some in (bases, [job for job in wanted if job[2]]):
+        for some in (list(dict.fromkeys(bases)), [job for job in wanted if job[2] not in alone]):
             list(pool.map(run, some))
 
 
@@ -155,13 +173,22 @@ def r_squared(row: Row, where: str) -> str:
     return " / ".join("-" if s is None else f"{s:.3f}" for s in scores)
 
 
-def table(out: Path, jobs: int, episodes: int = TEST_EPISODES, seeds: int = SEEDS) -> str:
+def table(
+    out: Path,
+    jobs: int,
+    episodes: int = TEST_EPISODES,
+    seeds: int = SEEDS,
+    rivals: bool = False,
+) -> str:
     """Run what is missing, write table.md and table.json, and return the Markdown."""
-    changes = ("", "literal")
-    wanted = [(t, s, c) for c in changes for t in tasks.TASKS for s in range(seeds)]
+    count = {"": seeds, "literal": seeds}
+    count |= {rival: min(seeds, RIVAL_SEEDS) for rival in RIVALS if rivals}
+    wanted = [(t, s, c) for c, n in count.items() for t in tasks.TASKS for s in range(n)]
     run_missing(out, wanted, jobs, episodes)
     runs = {
-        (t, c): [read(out, t, s, c) for s in range(seeds)] for t in tasks.TASKS for c in changes
+        (t, c): [read(out, t, s, c) for s in range(n)]
+        for t in tasks.TASKS
+        for c, n in count.items()
     }
     text = markdown(
         HEAD, [success(task, runs[task, ""], runs[task, "literal"]) for task in tasks.TASKS]
@@ -174,9 +201,27 @@ def table(out: Path, jobs: int, episodes: int = TEST_EPISODES, seeds: int = SEED
             for r in runs[task, ""]
         ],
     )
+    if rivals:
+        text += "\n" + table_two(runs)
     write_atomic(out / "table.md", text)
     write_rows(out / "table.json", runs)
     return text
+
+
+def table_two(runs: dict[tuple[str, str], list[Row]]) -> str:
+    """The paper's Table II: methods, tasks, success rates, ours before the paper's, and hours."""
+    rows = []
+    for change, (name, videos) in METHODS.items():
+        cells = [
+            f"{percent(runs[t, change])} / {TABLE_II[change][t]} %"
+            if runs.get((t, change))
+            else "-"
+            for t in tasks.TASKS
+        ]
+        done = [r for (_, c), some in runs.items() if c == change for r in some]
+        hours = sum(sum(r["stages"].values()) for r in done) / 3600
+        rows.append([name, videos, *cells, f"{hours:.1f} h in {len(done)} runs"])
+    return markdown(["method", "expert videos", *tasks.TASKS, "time"], rows)
 
 
 def success(task: str, mended: list[Row], literal: list[Row]) -> list[str]:
