@@ -42,7 +42,7 @@ ACTOR_EVERY = 2  # updates
 class SACAE(SAC):
     """Encoder, decoder, actor, twin critics and temperature with their optimizers.
 
-    size: "slim", or "published" at 25 times the cost. tau_encoder: pace of the target's encoder.
+    size: "slim", or "published" at 24 times the cost. tau_encoder: pace of the target's encoder.
     The other arguments are those of `SAC`.
     """
 

@@ -11,6 +11,7 @@ from gymnasium.wrappers import FrameStackObservation, TimeLimit
 
 import tasks
 from lbw_minimal import sac_ae
+from lbw_minimal.imitate import Run
 from lbw_minimal.replay import FrameBuffer
 from lbw_minimal.sac_ae import SACAE, SIZES, train
 from lbw_minimal.sac_ae_networks import Decoder, Encoder, Patches
@@ -54,7 +55,7 @@ def test_shapes(size, positions, drawn):
     patches, frames = Patches(size.patch), torch.from_numpy(frames_of(2))
     x = patches(frames)
     h = Encoder(size)(x)
-    assert x.shape == (2, 27 * size.patch**2 // 3, positions, positions) and h.shape == (2, 50)
+    assert x.shape == (2, 9 * size.patch**2, positions, positions) and h.shape == (2, 50)
     assert Decoder(size)(h).shape == patches.shrunk(x, size.shrink).shape == (2, *drawn)
 
 
@@ -111,7 +112,7 @@ def test_the_actors_loss_moves_neither_encoder_nor_critics():
 
 def test_the_critics_loss_trains_the_encoder():
     agent = small()
-    agent.updates, before = 0, values(agent.encoder)
+    before = values(agent.encoder)
     told = agent.update(batch_of())  # an odd update: critics alone
     assert "reconstruction" not in told and "actor_loss" not in told
     assert not any(equal(before, agent.encoder))
@@ -419,6 +420,13 @@ def test_a_checkpoint_holds_no_frames(tmp_path):
         sizes.append(path.stat().st_size)
         path.unlink()
     assert sizes[1] - sizes[0] < 100_000
+
+
+def test_a_finished_stage_leaves_no_frames(tmp_path):
+    with Run(tmp_path).stage("policy") as checkpoint:
+        train(dot(), steps=20, seed=0, random_steps=500, checkpoint=checkpoint)
+        assert (tmp_path / "policy.frames").exists()
+    assert [path.name for path in tmp_path.iterdir()] == ["metrics.json"]
 
 
 def test_a_saved_policy_acts_as_before_and_brings_its_encoder(tmp_path):
