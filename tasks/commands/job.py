@@ -173,7 +173,7 @@ def refuse_idle_options(args: argparse.Namespace, from_scratch: bool) -> None:
     if args.method != "lbw":
         why = f"--method {args.method} has no keypoints and learns its reward anew"
         idle += [("--from-scratch", args.from_scratch, why), ("--without", args.without, why),
-                 ("--reward", args.reward == "literal", why)]  # fmt: skip
+                 ("--reward", args.reward if args.reward != "mended" else None, why)]  # fmt: skip
         idle += [("--video", args.video, "the rivals learn from many videos")]
         if not args.evaluate:
             idle += [("--weights", args.weights, "a rival trains all of them anew")]

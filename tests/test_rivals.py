@@ -1,0 +1,145 @@
+"""The rivals as whole methods: what each stage is given, what it leaves, and how a run goes on."""
+
+import json
+
+import gymnasium as gym
+import numpy as np
+import pytest
+
+import tasks
+from lbw_minimal import classifier, cyclegan, rivals, sac_ae
+from lbw_minimal.imitate import Recipe, Run
+from tasks.__main__ import main
+from tasks.commands import job
+
+TINY = Recipe(
+    human_frames=0, robot_frames=0, munit_iterations=2, munit_width=4,
+    classifier_iterations=5, policy_steps=40,
+)  # fmt: skip
+
+
+def film(length, tone=90, seed=0):
+    frames = np.random.default_rng(seed).integers(0, 20, (length, 84, 84, 3)) + tone
+    return frames.astype(np.uint8)
+
+
+def run_in(folder):
+    folder.mkdir(exist_ok=True)
+    return Run(folder)
+
+
+def reach():
+    return gym.make(tasks.id_of("reach"), jitter=0.005)
+
+
+ARGS = {"task": "reach", "seed": 0}
+
+
+def test_the_classifier_reward_goes_from_videos_to_a_policy_and_repeats_nothing(
+    tmp_path, monkeypatch
+):
+    videos = [film(30, seed=i) for i in range(2)]
+    policy, env = rivals.classifier_reward(reach(), videos, TINY, run=run_in(tmp_path), **ARGS)
+    obs, _ = env.reset(seed=0)
+    assert obs.shape == (3, 84, 84, 3)
+    assert policy.act(obs, deterministic=True).shape == (3,)
+    for module in (classifier, sac_ae):
+        monkeypatch.setattr(module, "train", lambda *_, **__: pytest.fail("trained again"))
+    again, _ = rivals.classifier_reward(reach(), videos, TINY, run=run_in(tmp_path), **ARGS)
+    np.testing.assert_array_equal(
+        again.act(obs, deterministic=True), policy.act(obs, deterministic=True)
+    )
+    assert set(run_in(tmp_path).metrics["stages"]) == {"classifier", "policy"}
+
+
+def test_avids_classifier_is_shown_translated_videos_of_all_experts(tmp_path, monkeypatch):
+    shown, learnt = [], []
+    monkeypatch.setattr(cyclegan, "translate", lambda model, frames: 255 - frames)
+    real = classifier.goal_frames
+    monkeypatch.setattr(classifier, "goal_frames", lambda v: shown.append(v) or real(v))
+    train = cyclegan.train
+
+    def watch(human, robot, **more):
+        learnt.append((human, robot, more["iterations"]))
+        return train(human, robot, **more)
+
+    monkeypatch.setattr(cyclegan, "train", watch)
+    experts, random, robot = [film(20, 60 + i) for i in range(3)], film(6, 100), film(8, 200)
+    rivals.avid_m(reach(), experts, random, robot, TINY, run=run_in(tmp_path), **ARGS)
+    ((human, seen, iterations),) = learnt
+    # LbW's frames: the one demonstration, and random motion
+    np.testing.assert_array_equal(human, np.concatenate([experts[0], random]))
+    np.testing.assert_array_equal(seen, robot)
+    assert iterations == TINY.munit_iterations
+    for video, expert in zip(shown[0], experts, strict=True):
+        np.testing.assert_array_equal(video, 255 - expert)
+
+
+@pytest.mark.parametrize(("longest", "steps"), [(20, 25), (500, tasks.module("reach").HORIZON)])
+def test_an_episode_lasts_as_long_as_the_longest_video_asks_and_the_task_allows(longest, steps):
+    env = rivals.watched(reach(), [film(5), film(longest)], classifier.GoalClassifier())
+    env.reset(seed=0)
+    count, ended = 0, False
+    while not ended:
+        *_, truncated, info = env.step(np.zeros(3, np.float32))
+        count, ended = count + 1, truncated
+    assert count == steps and set(info["reward_parts"]) == {"logit"}
+
+
+def test_the_clip_of_the_recipe_bounds_the_reward():
+    model = classifier.GoalClassifier()
+    model.layers[-1].bias.data.fill_(7.0)
+    env = rivals.watched(reach(), [film(20)], model, clip=2.0)
+    env.reset(seed=0)
+    _, reward, *_, info = env.step(np.zeros(3, np.float32))
+    assert reward == 2.0 and info["reward_parts"]["logit"] > 5
+
+
+@pytest.mark.parametrize("method", ["classifier", "avid"])
+def test_a_rivals_run_ends_with_a_page_and_is_replayed(method, tmp_path, capfd, monkeypatch):
+    monkeypatch.setattr(tasks, "ROBOT_EXPERTS", 2)
+    monkeypatch.setattr(job, "EXPERTS", 2)
+    fields = {"classifier_iterations": 5, "policy_steps": 40}
+    if method == "avid":
+        fields |= {"munit_iterations": 2, "robot_frames": 40}
+    more = [word for k, v in fields.items() for word in ("--set", f"{k}={v}")]
+    out = tmp_path / "run"
+    arguments = ["reach", "--method", method, "--fast", *more]
+    assert main([*arguments, "--out", str(out)]) == 0
+    assert "reach: " in capfd.readouterr().out
+    page = (out / "report.html").read_text()
+    assert {"avid": "AVID-m", "classifier": "Classifier reward"}[method] in page
+    metrics = json.loads((out / "metrics.json").read_text())
+    assert metrics["settings"]["method"] == method
+    assert "K" not in metrics["settings"]["recipe"]
+    again = ["reach", "--method", method, "--evaluate", "--episodes", "2", "--weights", str(out)]
+    assert main([*again, "--out", str(tmp_path / "again")]) == 0
+    episodes = json.loads((tmp_path / "again" / "metrics.json").read_text())["episodes"]
+    assert episodes == metrics["episodes"]
+
+
+REFUSED = {
+    "--reward literal": "--reward literal",
+    "--without trim": "--without trim",
+    "--from-scratch": "--from-scratch",
+    "--weights x": "--weights x",
+    "--evaluate": "--weights",
+    "--set K=3": "no 'K'",
+    "--video x.mp4": "--video x.mp4",
+}
+
+
+@pytest.mark.parametrize("method", ["classifier", "avid"])
+@pytest.mark.parametrize("options", REFUSED)
+def test_what_does_nothing_for_a_rival_is_refused(options, method, tmp_path, capfd):
+    out = tmp_path / "run"
+    line = ["push", "--method", method, *options.split(), "--out", str(out)]
+    assert main(line) == 2
+    error = capfd.readouterr().err
+    assert error.startswith("error: ") and error.count("\n") == 1 and REFUSED[options] in error
+    assert not out.exists()
+
+
+def test_what_only_rivals_take_is_refused_for_lbw(capfd):
+    assert main(["push", "--set", "pixel_updates=2"]) == 2
+    assert "no 'pixel_updates'" in capfd.readouterr().err
