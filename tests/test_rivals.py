@@ -104,7 +104,7 @@ def test_a_rivals_run_ends_with_a_page_and_is_replayed(method, tmp_path, capfd, 
         fields |= {"munit_iterations": 2, "robot_frames": 40}
     more = [word for k, v in fields.items() for word in ("--set", f"{k}={v}")]
     out = tmp_path / "run"
-    arguments = ["reach", "--method", method, "--fast", *more]
+    arguments = ["reach", "--method", method, "--fast", "--threads", "1", *more]
     assert main([*arguments, "--out", str(out)]) == 0
     assert "reach: " in capfd.readouterr().out
     page = (out / "report.html").read_text()
@@ -112,7 +112,8 @@ def test_a_rivals_run_ends_with_a_page_and_is_replayed(method, tmp_path, capfd, 
     metrics = json.loads((out / "metrics.json").read_text())
     assert metrics["settings"]["method"] == method
     assert "K" not in metrics["settings"]["recipe"]
-    again = ["reach", "--method", method, "--evaluate", "--episodes", "2", "--weights", str(out)]
+    again = ["reach", "--method", method, "--evaluate", "--episodes", "2", "--threads", "1"]
+    again += ["--weights", str(out)]
     assert main([*again, "--out", str(tmp_path / "again")]) == 0
     episodes = json.loads((tmp_path / "again" / "metrics.json").read_text())["episodes"]
     assert episodes == metrics["episodes"]
