@@ -11,6 +11,7 @@ from lbw_minimal import classifier, cyclegan, rivals, sac_ae
 from lbw_minimal.imitate import Recipe, Run
 from tasks.__main__ import main
 from tasks.commands import job
+from tasks.commands.job import parser
 
 TINY = Recipe(
     human_frames=0, robot_frames=0, munit_iterations=2, munit_width=4,
@@ -144,3 +145,36 @@ def test_what_does_nothing_for_a_rival_is_refused(options, method, tmp_path, cap
 def test_what_only_rivals_take_is_refused_for_lbw(capfd):
     assert main(["push", "--set", "pixel_updates=2"]) == 2
     assert "no 'pixel_updates'" in capfd.readouterr().err
+
+
+def count_videos(*line):
+    args = parser("push").read(list(line))
+    return len(job.videos("push", args))
+
+
+def test_each_method_learns_from_as_many_videos_as_in_the_paper_or_as_asked():
+    assert count_videos() == 1
+    assert count_videos("--method", "avid") == 15
+    assert count_videos("--method", "avid", "--videos", "5") == 5
+    assert count_videos("--method", "classifier") == 0
+
+
+def test_further_videos_join_the_human_domain_of_lbw_and_not_its_demonstration(tmp_path):
+    line = ["--from-scratch", "--videos", "3", "--out", str(tmp_path / "three")]
+    three = job.check("push", parser("push").read(line), line)
+    line = ["--from-scratch", "--out", str(tmp_path / "one")]
+    one = job.check("push", parser("push").read(line), line)
+    np.testing.assert_array_equal(three.demo, one.demo)
+    more = len(three.random) - len(one.random)
+    assert more == len(three.experts[1]) + len(three.experts[2])
+    assert three.run.metrics["settings"]["video"] != one.run.metrics["settings"]["video"]
+
+
+@pytest.mark.parametrize(
+    "line",
+    ["--videos 5", "--method classifier --videos 5", "--from-scratch --videos 16",
+     "--video x.mp4 --videos 2"],
+)  # fmt: skip
+def test_videos_that_no_one_sees_are_refused(line, tmp_path, capfd):
+    assert main(["push", *line.split(), "--out", str(tmp_path / "run")]) == 2
+    assert "--videos" in capfd.readouterr().err

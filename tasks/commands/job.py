@@ -50,8 +50,14 @@ def parser(name: str) -> Parser:
     """The arguments of a run of the task `name`."""
     p = Parser(name, "Learn a task from its human video, test the policy, and write a report.")
     add = p.add_argument
-    add("--method", choices=METHODS, default="lbw", help="avid, classifier: the paper's rivals")
+    add(
+        "--method",
+        choices=tuple(METHODS),
+        default="lbw",
+        help="avid, classifier: the paper's rivals",
+    )
     add("--video", type=Path, metavar="FILE", help="another human video, as the whole human domain")
+    add("--videos", type=at_least(1), metavar="N", help="human videos (lbw 1, avid 15)")
     add("--from-scratch", action="store_true", help="train perception too")
     add("--reward", choices=("mended", "literal"), default="mended", help="literal: Eq. 8-10")
     add("--without", choices=MENDS, help="leave one mend of the reward out")
@@ -78,7 +84,7 @@ class Job:
     recipe: Recipe
     from_scratch: bool
     experts: list[np.ndarray]  # human videos of the task, (N, 84, 84, 3) uint8 each
-    random: np.ndarray  # random human motion, same type; empty with the user's own video
+    random: np.ndarray  # other human motion, same type; empty with the user's own video
     trained: Perception | None  # None if perception is to be learnt
     weights: Path  # folder of trained weights
     command: str  # what makes this run again
@@ -103,6 +109,8 @@ def check(name: str, args: argparse.Namespace, argv: list[str]) -> Job:
 
     experts = [read_video(path) for path in videos(name, args)]
     random = experts[0][:0] if args.video else read_video(tasks.VIDEOS / name / "random.mp4")
+    if lbw:  # whose demonstration is one: the translation sees the others beside random motion
+        random = np.concatenate([random, *experts[1:]])
     weights = args.weights or tasks.WEIGHTS / name
     perception = load_perception(weights, name) if lbw and not from_scratch else None
     if args.evaluate:
@@ -139,7 +147,10 @@ def videos(name: str, args: argparse.Namespace) -> list[Path]:
     """Files of the human videos that the method learns from, the demonstration first."""
     if args.video:
         return [args.video]
-    count = {"lbw": 1, "avid": EXPERTS, "classifier": 0}[args.method]  # the last films the robot
+    if args.videos and args.videos > EXPERTS:
+        raise InputError(f"--videos {args.videos}: {name} has {EXPERTS} human videos.")
+    usual = {"lbw": 1, "avid": EXPERTS, "classifier": 0}  # the last one films the robot
+    count = args.videos or usual[args.method]
     return [tasks.VIDEOS / name / f"expert_{i + 1:02d}.mp4" for i in range(count)]
 
 
@@ -170,6 +181,13 @@ def refuse_idle_options(args: argparse.Namespace, from_scratch: bool) -> None:
         idle = [("--from-scratch", args.from_scratch, why), ("--video", args.video, why),
                 ("--set", args.set, why), ("--fast", args.fast, why),
                 ("--resume", args.resume, why)]  # fmt: skip
+    if args.method == "lbw" and args.videos and args.videos > 1 and not args.from_scratch:
+        why = "only a translation that is trained sees more than one; add --from-scratch"
+        idle += [("--videos", args.videos, why)]
+    if args.method == "classifier":
+        idle += [("--videos", args.videos, "the classifier reward films the robot itself")]
+    if args.video:
+        idle += [("--videos", args.videos, "--video gives the only one")]
     if args.method != "lbw":
         why = f"--method {args.method} has no keypoints and learns its reward anew"
         idle += [("--from-scratch", args.from_scratch, why), ("--without", args.without, why),
