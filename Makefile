@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN = $(VENV)/bin
 
-.PHONY: push reach test slow peers bench lab notebooks book clean
+.PHONY: push reach test slow peers cluster bench lab notebooks book clean
 
 push reach: $(VENV)/ready
 	$(BIN)/python -m tasks $@
@@ -19,6 +19,10 @@ slow: $(VENV)/ready
 
 peers: .venv-peers/ready-peers
 	.venv-peers/bin/python -m pytest -q -m peers
+
+cluster: $(VENV)/ready
+	$(BIN)/pip install -q -r requirements-cluster.txt
+	$(BIN)/python -m pytest -q tests/test_cluster.py
 
 bench: $(VENV)/ready
 	$(BIN)/python -m tasks bench

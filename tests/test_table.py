@@ -10,7 +10,7 @@ import pytest
 from lbw_minimal.reward import MENDS
 from lbw_minimal.training import InputError
 from tasks import TASKS, WEIGHTS
-from tasks.commands import ablation, table
+from tasks.commands import ablation, batch, table
 from tasks.commands.job import fields_of
 
 ROOT = Path(__file__).parents[1]
@@ -36,9 +36,9 @@ def runs(tmp_path, monkeypatch):
     monkeypatch.setattr("tasks.TASKS", ("push", "slide"))
     for task, wins in (("push", (10, 10, 9)), ("slide", (8, 7, 9))):
         for seed, n in enumerate(wins):
-            finish(table.folder(tmp_path, task, seed), n)
+            finish(batch.folder(tmp_path, task, seed), n)
             for change in ("literal", *MENDS):
-                finish(table.folder(tmp_path, task, seed, change), 0)
+                finish(batch.folder(tmp_path, task, seed, change), 0)
     return tmp_path
 
 
@@ -60,8 +60,8 @@ def test_row_has_the_rate_of_all_seeds_and_its_interval(runs):
 def test_the_rivals_stand_above_lbw_as_in_the_paper(runs):
     for task in ("push", "slide"):
         for seed in range(2):
-            finish(table.folder(runs, task, seed, "classifier"), 3 * seed)
-            finish(table.folder(runs, task, seed, "avid"), 1)
+            finish(batch.folder(runs, task, seed, "classifier"), 3 * seed)
+            finish(batch.folder(runs, task, seed, "avid"), 1)
     *_, head, _, classifier, avid, lbw = table.table(runs, jobs=1, rivals=True).splitlines()
     assert head == "| method | expert videos | push | slide | time |"
     # 3 of 20: Wilson 5.2 to 36.0 %; 2 of 20: 2.8 to 30.1 %
@@ -83,7 +83,7 @@ def test_a_rival_is_run_alone_with_perception_of_its_own(tmp_path, monkeypatch):
         return type("Done", (), {"returncode": 0})
 
     monkeypatch.setattr("subprocess.run", run)
-    table.run_missing(tmp_path, [("push", 1, "avid")], jobs=1, episodes=10)
+    batch.run_missing(tmp_path, [("push", 1, "avid")], jobs=1, episodes=10)
     (line,) = started
     assert line.endswith("--method avid") and "--weights" not in line
     assert f"--out {tmp_path / 'push-1-avid'}" in line
@@ -107,7 +107,7 @@ def test_finished_runs_are_not_repeated_and_others_go_on(tmp_path, monkeypatch):
         return type("Done", (), {"returncode": 0})
 
     monkeypatch.setattr("subprocess.run", run)
-    table.run_missing(tmp_path, [("push", 0, "literal"), ("push", 1, "")], jobs=1, episodes=10)
+    batch.run_missing(tmp_path, [("push", 0, "literal"), ("push", 1, "")], jobs=1, episodes=10)
     first, second = (" ".join(line).replace(f"{tmp_path}/", "") for line in started)
     both = "--threads 1 --out {} --episodes 10"
     assert first == f"push --seed 1 {both.format('push-1')} --from-scratch --resume"
@@ -118,7 +118,7 @@ def test_finished_runs_are_not_repeated_and_others_go_on(tmp_path, monkeypatch):
 def test_a_run_that_fails_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr("subprocess.run", lambda *a, **k: type("Done", (), {"returncode": 2}))
     with pytest.raises(InputError, match=r"push-0.*code 2"):
-        table.run_missing(tmp_path, [("push", 0, "")], jobs=1, episodes=10)
+        batch.run_missing(tmp_path, [("push", 0, "")], jobs=1, episodes=10)
 
 
 def read(path):
@@ -152,7 +152,7 @@ def test_shipped_policy_comes_from_the_run_in_its_note(task):
 
 def policy_row(task):
     """A task's line in the README: three trainings on the shipped perception."""
-    runs = [table.read(RESULTS / "policies", task, seed) for seed in range(3)]
+    runs = [batch.read(RESULTS / "policies", task, seed) for seed in range(3)]
     row = [task, f"{table.PAPER[task]} %", table.percent(runs), table.each(runs)]
     return [*row, f"{runs[0]['steps']:,}"]
 
@@ -168,7 +168,7 @@ def test_policies_are_as_good_as_the_readme_says():
 def test_shipped_run_is_in_the_folder_of_its_settings(path):
     settings = read(path)["settings"]
     change = settings["without"] or settings["reward"].replace("mended", "")
-    assert table.folder(RESULTS / "runs", settings["task"], settings["seed"], change) == path.parent
+    assert batch.folder(RESULTS / "runs", settings["task"], settings["seed"], change) == path.parent
 
 
 def test_shipped_tables_are_those_of_the_shipped_runs(tmp_path, monkeypatch):

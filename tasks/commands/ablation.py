@@ -16,9 +16,11 @@ from lbw_minimal.reward import MENDS
 from lbw_minimal.training import write_atomic
 from tasks.commands import Parser, table
 from tasks.commands.job import TEST_EPISODES
-from tasks.commands.table import SEEDS, Row, each, percent, rate, read, run_missing
+from tasks.commands.batch import Job, Row, print_missing, read, run_missing
+from tasks.commands.table import SEEDS, each, percent, rate
 
 ABLATED = ("push", "slide")
+CHANGES = ("", *MENDS, "literal")
 
 
 def parser() -> Parser:
@@ -29,26 +31,34 @@ def parser() -> Parser:
 def main(argv: list[str]) -> None:
     """Print the table, after running what is missing. Raises InputError if a run fails."""
     args = parser().read(argv)
-    print(ablation(args.out, args.jobs, args.episodes, args.seeds))
+    if args.print:
+        print_missing(args.out, wanted(args.seeds), args.episodes)
+    else:
+        print(ablation(args.out, args.jobs, args.episodes, args.seeds, args.ray))
 
 
-def ablation(out: Path, jobs: int, episodes: int = TEST_EPISODES, seeds: int = SEEDS) -> str:
+def wanted(seeds: int) -> list[Job]:
+    """The runs of the ablation."""
+    return [(t, s, c) for c in CHANGES for t in ABLATED for s in range(seeds)]
+
+
+def ablation(
+    out: Path, jobs: int, episodes: int = TEST_EPISODES, seeds: int = SEEDS, ray: bool = False
+) -> str:
     """Run what is missing, write ablation.md, .json and .png, and return the Markdown."""
-    changes = ("", *MENDS, "literal")
-    wanted = [(t, s, c) for c in changes for t in ABLATED for s in range(seeds)]
-    run_missing(out, wanted, jobs, episodes)
-    runs = {(t, c): [read(out, t, s, c) for s in range(seeds)] for t in ABLATED for c in changes}
+    run_missing(out, wanted(seeds), jobs, episodes, ray)
+    runs = {(t, c): [read(out, t, s, c) for s in range(seeds)] for t in ABLATED for c in CHANGES}
     names = {c: f"without {c}" for c in MENDS} | {"": "all mends", "literal": "literal Eq. 8-10"}
     text = table.markdown(
         ["reward", *(column for t in ABLATED for column in (t, "by seed"))],
         [
             [names[c], *(cell for t in ABLATED for cell in (percent(runs[t, c]), each(runs[t, c])))]
-            for c in changes
+            for c in CHANGES
         ],
     )
     write_atomic(out / "ablation.md", text)
     table.write_rows(out / "ablation.json", runs)
-    figure = bars({names[c]: [runs[t, c] for t in ABLATED] for c in changes})
+    figure = bars({names[c]: [runs[t, c] for t in ABLATED] for c in CHANGES})
     figure.savefig(out / "ablation.png", dpi=110)
     return text
 

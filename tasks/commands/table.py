@@ -8,19 +8,16 @@ every run has a folder of its own.
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 import tasks
 from lbw_minimal.report import wilson
-from lbw_minimal.training import InputError, write_atomic
-from tasks.commands import Parser, at_least, make_folder
+from lbw_minimal.training import write_atomic
+from tasks.commands import Parser, at_least
 from tasks.commands.job import TEST_EPISODES
+from tasks.commands.batch import Job, Row, print_missing, read, run_missing
 
 SEEDS = 3
 RIVAL_SEEDS = 2
@@ -46,7 +43,6 @@ HEAD = [
     "time",
     "policy steps",
 ]
-Row = dict[str, Any]  # a finished run, see `read`
 
 
 def parser(command: str = "table") -> Parser:
@@ -56,7 +52,12 @@ def parser(command: str = "table") -> Parser:
         "ablation": "What each mend of the reward is worth",
     }
     p = Parser(command, f"{what[command]}. What is missing is run first; it takes hours.")
-    p.add_argument("--jobs", type=at_least(1), default=1, help="runs at a time")
+    how = p.add_mutually_exclusive_group()
+    how.add_argument("--jobs", type=at_least(1), default=1, help="runs at a time")
+    how.add_argument("--ray", action="store_true", help="run what is missing on a Ray cluster")
+    how.add_argument(
+        "--print", action="store_true", help="only print what is missing: its commands"
+    )
     p.add_argument(
         "--episodes", type=at_least(1), default=TEST_EPISODES, help="test episodes a run"
     )
@@ -72,76 +73,10 @@ def parser(command: str = "table") -> Parser:
 def main(argv: list[str]) -> None:
     """Print the table, after running what is missing. Raises InputError if a run fails."""
     args = parser().read(argv)
-    print(table(args.out, args.jobs, args.episodes, args.seeds, args.rivals))
-
-
-def folder(out: Path, task: str, seed: int, change: str = "") -> Path:
-    """The folder of a run; change: "" (the recipe), "literal", a mend left out, or a rival."""
-    return out / (f"{task}-{seed}-{change}" if change else f"{task}-{seed}")
-
-
-def finished(path: Path, episodes: int) -> bool:
-    """Whether a run has ended with that many test episodes."""
-    note = path / "metrics.json"
-    return note.exists() and len(json.loads(note.read_text()).get("episodes", ())) == episodes
-
-
-def command(out: Path, task: str, seed: int, change: str, episodes: int) -> list[str]:
-    """The arguments of one run. A changed reward learns on the perception of the unchanged run."""
-    path = folder(out, task, seed, change)
-    args = [task, "--seed", str(seed), "--threads", "1", "--out", str(path)]
-    args += ["--episodes", str(episodes)]
-    if change in RIVALS:
-        args += ["--method", change]
-    elif not change:
-        args.append("--from-scratch")
+    if args.print:
+        print_missing(args.out, wanted(counts(args.seeds, args.rivals)), args.episodes)
     else:
-        args += ["--weights", str(folder(out, task, seed))]
-        args += ["--reward", "literal"] if change == "literal" else ["--without", change]
-    return args + ["--resume"] * (path / "settings.json").exists()
-
-
-def run_missing(out: Path, wanted: list[tuple[str, int, str]], jobs: int, episodes: int) -> None:
-    """Run what is not finished, `jobs` at a time, perception first.
-
-    A finished run with another number of test episodes is tested again, not trained. Raises
-    InputError if a run fails.
-    """
-
-    def run(job):
-        path = folder(out, *job)
-        if finished(path, episodes):
-            return
-        print(f"running {path.name}", flush=True)
-        with (out / f"{path.name}.log").open("a") as log:
-            line = [sys.executable, "-m", "tasks", *command(out, *job, episodes)]
-            code = subprocess.run(line, stdout=log, stderr=log).returncode
-        if code:
-            raise InputError(f"{path}: the run ended with code {code}; see {log.name}.")
-
-    make_folder(out)
-    alone = ("", *RIVALS)  # the others learn on the perception of the unchanged run
-    bases = [(task, seed, c if c in alone else "") for task, seed, c in wanted]
-    with ThreadPoolExecutor(jobs) as pool:
-        for some in (list(dict.fromkeys(bases)), [job for job in wanted if job[2] not in alone]):
-            list(pool.map(run, some))
-
-
-def read(out: Path, task: str, seed: int, change: str = "") -> Row:
-    """One finished run as a row: its wins, seconds a stage, steps, and R^2 of perception."""
-    metrics = json.loads((folder(out, task, seed, change) / "metrics.json").read_text())
-    return {
-        "task": task,
-        "seed": seed,
-        "change": change or "mended",
-        "wins": sum(e["success"] for e in metrics["episodes"]),
-        "wins_at_end": sum(e["success_at_end"] for e in metrics["episodes"]),
-        "episodes": len(metrics["episodes"]),
-        "stages": metrics["stages"],
-        "steps": metrics["settings"]["recipe"]["policy_steps"],
-        "memory_mb": metrics["memory_mb"],
-        "perception": metrics.get("perception"),
-    }
+        print(table(args.out, args.jobs, args.episodes, args.seeds, args.rivals, args.ray))
 
 
 def rate(rows: list[Row]) -> tuple[float, float, float]:
@@ -173,18 +108,28 @@ def r_squared(row: Row, where: str) -> str:
     return " / ".join("-" if s is None else f"{s:.3f}" for s in scores)
 
 
+def counts(seeds: int, rivals: bool) -> dict[str, int]:
+    """How many runs of each task the table has, by their change."""
+    count = {"": seeds, "literal": seeds}
+    return count | {rival: min(seeds, RIVAL_SEEDS) for rival in RIVALS if rivals}
+
+
+def wanted(count: dict[str, int]) -> list[Job]:
+    """The runs of the table."""
+    return [(t, s, c) for c, n in count.items() for t in tasks.TASKS for s in range(n)]
+
+
 def table(
     out: Path,
     jobs: int,
     episodes: int = TEST_EPISODES,
     seeds: int = SEEDS,
     rivals: bool = False,
+    ray: bool = False,
 ) -> str:
     """Run what is missing, write table.md and table.json, and return the Markdown."""
-    count = {"": seeds, "literal": seeds}
-    count |= {rival: min(seeds, RIVAL_SEEDS) for rival in RIVALS if rivals}
-    wanted = [(t, s, c) for c, n in count.items() for t in tasks.TASKS for s in range(n)]
-    run_missing(out, wanted, jobs, episodes)
+    count = counts(seeds, rivals)
+    run_missing(out, wanted(count), jobs, episodes, ray)
     runs = {
         (t, c): [read(out, t, s, c) for s in range(n)]
         for t in tasks.TASKS

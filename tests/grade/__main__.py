@@ -23,7 +23,7 @@ from pathlib import Path
 
 import torch
 
-from lbw_minimal.training import write_atomic
+from lbw_minimal.training import InputError, write_atomic
 from tests.grade import feedback, sandbox
 from tests.grade.exercise import Exercise, everything
 from tests.grade.judge import Result, judge, nothing
@@ -48,8 +48,10 @@ def main(argv=None) -> int:
     parser.add_argument(
         "--seed", type=int, default=SEED, help="of the inputs; students have 0 (%(default)s)"
     )
+    how = parser.add_mutually_exclusive_group()
     jobs = {"type": int, "choices": range(1, 65), "default": 2, "metavar": "N"}
-    parser.add_argument("-j", "--jobs", **jobs, help="submissions at a time")
+    how.add_argument("-j", "--jobs", **jobs, help="submissions at a time")
+    how.add_argument("--ray", action="store_true", help="grade on a Ray cluster")
     parser.add_argument(
         "--gradescope", action="store_true", help="write results.json for Gradescope, too"
     )
@@ -64,13 +66,13 @@ def main(argv=None) -> int:
     except OSError as e:
         print(f"{args.out}: cannot write there ({e.strerror}); give another --out", file=sys.stderr)
         return 2
-    if lacks := sandbox.warning():
+    if (lacks := sandbox.warning()) and not args.ray:  # on a cluster each node looks at its own
         print(f"warning: {lacks}", file=sys.stderr)
     torch.set_num_threads(1)
 
-    def job(entry):
+    def job(entry, graded=None):
         try:
-            done = grade_once(entry, ids, args.out, args.gradescope, args.seed)
+            done = grade_once(entry, ids, args.out, args.gradescope, args.seed, graded)
         except Exception as e:  # the class goes on; without a result.json this is tried again
             traceback.print_exc()
             why = f"NOT GRADED, {type(e).__name__}: {e}"
@@ -82,7 +84,13 @@ def main(argv=None) -> int:
 
     with ThreadPoolExecutor(args.jobs) as pool:
         try:
-            grades = list(pool.map(job, entries))
+            if args.ray:
+                grades = on_cluster(job, entries, ids, args.out, args.seed)
+            else:
+                grades = list(pool.map(job, entries))
+        except InputError as e:
+            print(e, file=sys.stderr)
+            return 2
         except KeyboardInterrupt:
             pool.shutdown(wait=False, cancel_futures=True)
             print("interrupted; the same command goes on where this one was", file=sys.stderr)
@@ -199,22 +207,56 @@ def grade_one(exercise: Exercise, given: Answer, box: Sandbox, seed: int = 0) ->
         box.close()
 
 
-def grade_once(entry: Path, ids: list[str], out: Path, gradescope: bool, seed: int) -> dict:
-    """Grade a submission and write its pages, unless done before for the same files and checks."""
-    digest = fingerprint(entry, ids, seed)
+def grade_once(entry: Path, ids: list[str], out: Path, gradescope: bool, seed: int, graded) -> dict:
+    """Grade a submission and write its pages, unless done before for the same files and checks.
+
+    graded: None; or what a cluster made of it, see `cluster.grade_here`, an exception if it failed.
+    """
+    if isinstance(graded, Exception):
+        raise graded
     folder = out / safe(entry.name)
-    path = folder / "result.json"
-    done = json.loads(path.read_text()) if path.exists() else {}
-    if done.get("digest") != digest:
-        done = record(entry, *grade(entry, ids, seed)) | {"digest": digest}
+    digest, done = (graded[0], {}) if graded else before(entry, ids, out, seed)
+    if not done:
+        results, notes = graded[1:] if graded else grade(entry, ids, seed)
+        done = record(entry, results, notes) | {"digest": digest}
         folder.mkdir(parents=True, exist_ok=True)
         write_atomic(folder / "feedback.html", feedback.page(done))
         # Last: it says that all the rest is there.
-        write_atomic(path, json.dumps(done, indent=1) + "\n")
+        write_atomic(folder / "result.json", json.dumps(done, indent=1) + "\n")
     if gradescope:
         text = json.dumps(feedback.gradescope(done), indent=1) + "\n"
         write_atomic(folder / "results.json", text)
     return done
+
+
+def before(entry: Path, ids: list[str], out: Path, seed: int) -> tuple[str, dict]:
+    """A submission's fingerprint, and its record if it was graded before with the same one."""
+    digest = fingerprint(entry, ids, seed)
+    path = out / safe(entry.name) / "result.json"
+    done = json.loads(path.read_text()) if path.exists() else {}
+    return digest, done if done.get("digest") == digest else {}
+
+
+def on_cluster(job, entries: list[Path], ids: list[str], out: Path, seed: int) -> list[dict]:
+    """What `job` makes of each submission, those not graded before graded on a Ray cluster.
+
+    Raises InputError without Ray, or where no node's sandbox holds.
+    """
+    from tests.grade import cluster  # slow, and seldom needed
+
+    grades, there = {}, []
+    for entry in entries:
+        try:
+            digest, done = before(entry, ids, out, seed)
+            if not done:
+                there.append((entry, (cluster.pack(notebooks(entry), entry), digest, ids, seed)))
+                continue
+        except OSError:
+            pass  # `job` meets it again, and says so
+        grades[entry] = job(entry)
+    for entry, graded in cluster.spread(there):
+        grades[entry] = job(entry, graded)
+    return [grades[entry] for entry in entries]
 
 
 def record(entry: Path, results: list[Result], notes: list[str]) -> dict:

@@ -1,0 +1,131 @@
+"""Jobs on many machines: Ray runs them, starts them again, and knows where there is room.
+
+A job is a call of a function with plain values. What it returns comes back through Ray, files as
+bytes: the machines need no common folder. The kit's files travel with the jobs; each node needs
+Python with requirements.txt and requirements-cluster.txt installed.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from lbw_minimal.training import InputError
+
+ROOT = Path(__file__).resolve().parents[2]
+SHIPPED = ("lbw_minimal", "notebooks", "solutions", "tasks", "tests")  # of the kit: 20 MB
+RETRIES = 3  # new starts of a job whose worker or node was lost
+# Python that dies with its parent (prctl 1, PR_SET_PDEATHSIG): nobody would end it on a lost node.
+MORTAL = (
+    "import ctypes, os, sys; ctypes.CDLL(None).prctl(1, 9); "
+    "os.execv(sys.executable, [sys.executable, *sys.argv[1:]])"
+)
+Files = dict[str, bytes]  # by their names in a folder
+
+
+class Refused(Exception):
+    """A node will not do such jobs; the message says why. The job goes to another node."""
+
+
+def connect() -> Any:
+    """Ray, connected to the cluster that runs here or at RAY_ADDRESS, else to a local one.
+
+    Raises InputError without Ray.
+    """
+    try:
+        import ray
+    except ImportError:
+        raise InputError(
+            "--ray: Ray is not installed; pip install -r requirements-cluster.txt does it."
+        ) from None
+    if not ray.is_initialized():
+        os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+        others = [f"/{path.name}" for path in ROOT.iterdir() if path.name not in SHIPPED]
+        options: dict[str, Any] = {"logging_level": "warning"}
+        options["runtime_env"] = {"working_dir": str(ROOT), "excludes": others}
+        try:
+            ray.init(address="auto", **options)
+        except ConnectionError:
+            ray.init(address="local", include_dashboard=False, **options)
+    return ray
+
+
+def spread(
+    function: Callable, jobs: Iterable[tuple[Any, tuple]], memory: int
+) -> Iterator[tuple[Any, Any]]:
+    """function(*arguments) for each (name, arguments) of `jobs`, a core and `memory` bytes each.
+
+    Yields (name, result) in the order in which they end; the result is an exception where the
+    function raised one or its worker was lost too often. Raises InputError if all nodes refuse.
+    """
+    ray = connect()
+    task = ray.remote(num_cpus=1, memory=memory, max_retries=RETRIES)(attempt)
+    refused: dict[str, str] = {}  # by node
+
+    def start(arguments):
+        there = {"ray.io/node-id": f"!in({','.join(refused)})"} if refused else None
+        return task.options(label_selector=there).remote(function, arguments)
+
+    waiting = {start(arguments): (name, arguments) for name, arguments in jobs}
+    while waiting:
+        ref = ray.wait(list(waiting))[0][0]
+        name, arguments = waiting.pop(ref)
+        try:
+            result, node, why = ray.get(ref)
+        except ray.exceptions.RayError as error:
+            yield name, getattr(error, "cause", None) or error
+            continue
+        if not node:
+            yield name, result
+            continue
+        if node not in refused:
+            print(why, file=sys.stderr)
+        refused[node] = why
+        able = (n["NodeID"] for n in ray.nodes() if n["Alive"] and n["Resources"].get("CPU"))
+        if refused.keys() >= set(able):
+            raise InputError(f"--ray: no node takes these jobs. {'. '.join(refused.values())}")
+        waiting[start(arguments)] = name, arguments
+
+
+def attempt(function: Callable, arguments: tuple) -> tuple[Any, str, str]:
+    """On a node: the function's result; or, of a node that refuses, its id and why."""
+    import ray
+
+    try:
+        return function(*arguments), "", ""
+    except Refused as why:
+        context = ray.get_runtime_context()
+        return None, context.get_node_id(), f"node {ray.util.get_node_ip_address()}: {why}"
+
+
+def python(line: list[str], folders: dict[str, Files], result: str) -> tuple[int, str, Files]:
+    """On a node: run Python with the arguments `line` in a folder that holds only `folders`.
+
+    Returns the exit code, what it printed, and the files of its folder `result`.
+    """
+    with TemporaryDirectory() as here:
+        for name, files in folders.items():
+            unpack(files, Path(here) / name)
+        done = subprocess.run(
+            [sys.executable, "-c", MORTAL, *line], cwd=here, stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+            env=os.environ | {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"},
+        )  # fmt: skip
+        return done.returncode, done.stdout.decode(errors="replace"), pack(Path(here) / result)
+
+
+def pack(folder: Path, pattern: str = "*") -> Files:
+    """The files in a folder; none if there is no such folder."""
+    return {path.name: path.read_bytes() for path in folder.glob(pattern) if path.is_file()}
+
+
+def unpack(files: Files, folder: Path) -> None:
+    """Write files into a folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, data in files.items():
+        (folder / name).write_bytes(data)
