@@ -4,7 +4,6 @@ import json
 
 import gymnasium as gym
 import numpy as np
-import pytest
 
 import tasks
 from tasks.commands import JITTER, controls
@@ -70,8 +69,8 @@ def test_the_best_robot_is_chosen_on_other_starts_than_the_tests(monkeypatch):
         controls, "play", lambda env, robot, seed, whole: (seeds.append(seed) or robot(0, 0) > 0, 0)
     )
     good, bad = (lambda obs, t: 1), (lambda obs, t: -1)
-    assert controls.best(Sides(), [bad, good, bad]) is good
-    assert len(set(seeds)) == controls.TRIALS and min(seeds) >= TEST_SEED + 100_000
+    assert controls.best(Sides(), [bad, good, bad], trials=7) is good
+    assert len(set(seeds)) == 7 and min(seeds) >= TEST_SEED + 100_000
 
 
 def test_robots_without_eyes_do_what_their_names_say():
@@ -96,14 +95,9 @@ def test_the_blinded_cameras_show_no_news():
     frozen.close(), grey.close()
 
 
-@pytest.fixture
-def brief(monkeypatch):
-    """Fewer trials, fewer takes: what is compared stays the same."""
-    for name, value in {"LIBRARY": 2, "TRIALS": 1, "JITTERS": (JITTER,)}.items():
-        monkeypatch.setattr(controls, name, value)
-
-
-def test_the_shipped_policy_reaches_and_idle_and_grey_do_not(brief, tmp_path, capsys):
+def test_the_shipped_policy_reaches_and_idle_does_not(tmp_path, capsys, monkeypatch):
+    whole = controls.measure
+    monkeypatch.setattr(controls, "measure", lambda *asked: whole(*asked, brief=True))
     controls.main(["reach", "--episodes", "2", "--out", str(tmp_path)])
     found = json.loads((tmp_path / "reach.json").read_text())["success"][str(JITTER)]
     assert found["the policy"] == 2 and found["idle"] == 0

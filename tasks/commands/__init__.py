@@ -21,6 +21,7 @@ COMMANDS = {  # each a file in this folder
     "export": "the experts' actions, states and frames as a Minari dataset",
     "table": "the results of all tasks; what is missing is run first",
     "ablation": "what each mend of the reward is worth",
+    "paper": "the paper's tables and figures on one page; what is missing is run first",
     "gallery": "one page with every task's scene, demonstration and rollout",
     "viewer": "a task's scene as a page that turns with the mouse",
     "probe": "how well the keypoints tell where things are",

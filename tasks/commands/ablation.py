@@ -15,8 +15,8 @@ from lbw_minimal.pictures import COLOURS, STYLE
 from lbw_minimal.reward import MENDS
 from lbw_minimal.training import write_atomic
 from tasks.commands import Parser, table
-from tasks.commands.job import TEST_EPISODES
 from tasks.commands.batch import Job, Row, print_missing, read, run_missing
+from tasks.commands.job import TEST_EPISODES
 from tasks.commands.table import SEEDS, each, percent, rate
 
 ABLATED = ("push", "slide")

@@ -23,6 +23,14 @@ ALONE = {
     "": ["--from-scratch"],
     "classifier": ["--method", "classifier"],
     "avid": ["--method", "avid"],
+    # Three times the steps that reach and push have.
+    "classifier-long": ["--method", "classifier", "--set", "policy_steps=9000"],
+    "avid-long": ["--method", "avid", "--set", "policy_steps=9000"],
+    # Other numbers of human videos than 1 and 15.
+    "videos-5": ["--from-scratch", "--videos", "5"],
+    "videos-15": ["--from-scratch", "--videos", "15"],
+    "avid-1": ["--method", "avid", "--videos", "1"],
+    "avid-5": ["--method", "avid", "--videos", "5"],
 }
 # ... and these learn on the perception of the unchanged run.
 LATER = {"literal": ["--reward", "literal"]} | {mend: ["--without", mend] for mend in MENDS}
@@ -43,8 +51,10 @@ def finished(path: Path, episodes: int) -> bool:
     return note.exists() and len(json.loads(note.read_text()).get("episodes", ())) == episodes
 
 
-def command(out: Path, task: str, seed: int, change: str, episodes: int) -> list[str]:
-    """The arguments of one run."""
+def command(
+    out: Path, task: str, seed: int, change: str, episodes: int, fast: bool = False
+) -> list[str]:
+    """The arguments of one run; fast: as a smoke run."""
     path = folder(out, task, seed, change)
     args = [task, "--seed", str(seed), "--threads", "1", "--out", str(path)]
     args += ["--episodes", str(episodes)]
@@ -52,6 +62,7 @@ def command(out: Path, task: str, seed: int, change: str, episodes: int) -> list
         args += ALONE[change]
     else:
         args += ["--weights", str(folder(out, task, seed)), *LATER[change]]
+    args += ["--fast"] * fast
     return args + ["--resume"] * (path / "settings.json").exists()
 
 
@@ -76,18 +87,25 @@ def print_missing(out: Path, wanted: list[Job], episodes: int) -> None:
         )
 
 
-def run_missing(out: Path, wanted: list[Job], jobs: int, episodes: int, ray: bool = False) -> None:
+def run_missing(
+    out: Path,
+    wanted: list[Job],
+    jobs: int,
+    episodes: int,
+    ray: bool = False,
+    fast: bool = False,
+) -> None:
     """Run what is not finished, `jobs` at a time or on a Ray cluster, perception first.
 
-    A finished run with another number of test episodes is tested again, not trained. Raises
-    InputError if a run fails.
+    fast: smoke runs, on this machine. A finished run with another number of test episodes is
+    tested again, not trained. Raises InputError if a run fails.
     """
 
     def run(job):
         path = folder(out, *job)
         print(f"running {path.name}", flush=True)
         with (out / f"{path.name}.log").open("a") as log:
-            line = [sys.executable, *RUN, *command(out, *job, episodes)]
+            line = [sys.executable, *RUN, *command(out, *job, episodes, fast)]
             code = subprocess.run(line, stdout=log, stderr=log).returncode
         if code:
             raise InputError(f"{path}: the run ended with code {code}; see {log.name}.")

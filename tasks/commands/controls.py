@@ -115,16 +115,25 @@ def wins(env: gym.Env, robot: Robot, episodes: int, seed: int = TEST_SEED) -> in
     return sum(play(env, robot, seed + i, whole=False)[0] for i in range(episodes))
 
 
-def best(env: gym.Env, robots: list[Robot]) -> Robot:
+def best(env: gym.Env, robots: list[Robot], trials: int) -> Robot:
     """The robot that succeeds most often on the trial starts."""
-    return max(robots, key=lambda robot: wins(env, robot, TRIALS, TRIAL_SEED))
+    return max(robots, key=lambda robot: wins(env, robot, trials, TRIAL_SEED))
 
 
-def compare(task: str, weights: Path, jitter: float, episodes: int, seed: int) -> dict[str, int]:
+def compare(
+    task: str,
+    weights: Path,
+    jitter: float,
+    episodes: int,
+    seed: int,
+    library: int = LIBRARY,
+    trials: int = TRIALS,
+) -> dict[str, int]:
     """Successes of the policy in `weights` and of every control, with starts moved by `jitter` (m).
 
-    seed: that of the training, whose film of the robot set the demonstration's pace. Raises
-    InputError if weights are missing, damaged, or another task's.
+    seed: that of the training, whose film of the robot set the demonstration's pace. library:
+    episodes of the policy that are kept for replays; trials: episodes that choose a blind robot.
+    Raises InputError if weights are missing, damaged, or another task's.
     """
     perception = tasks.trained_perception(task, weights)
     policy = sac.load(weights / "policy.safetensors")
@@ -143,7 +152,7 @@ def compare(task: str, weights: Path, jitter: float, episodes: int, seed: int) -
         blinded = seen_through(camera)[0]
         found[name] = wins(blinded, trained, episodes)
         blinded.close()
-    own = [play(env, trained, TRIAL_SEED + i) for i in range(LIBRARY)]
+    own = [play(env, trained, TRIAL_SEED + i) for i in range(library)]
     done = [episode for episode in own if episode[0]] or own
     looks = look_once(np.stack([first for _, _, first, _ in done]), [a for *_, a in done])
     found["looks once, then replays"] = wins(env, looks, episodes)
@@ -155,9 +164,11 @@ def compare(task: str, weights: Path, jitter: float, episodes: int, seed: int) -
     directions = [d for d in itertools.product((-1, 0, 1), repeat=3) if d[1] == 0 and any(d)]
     found |= {
         "blind replay of its best episode": wins(blind, replay(actions), episodes),
-        "best constant action": wins(blind, best(blind, [*map(constant, directions)]), episodes),
+        "best constant action": wins(
+            blind, best(blind, [*map(constant, directions)], trials), episodes
+        ),
         "down, then along": wins(
-            blind, best(blind, [down_then_along(n) for n in range(3, 25, 3)]), episodes
+            blind, best(blind, [down_then_along(n) for n in range(3, 25, 3)], trials), episodes
         ),
         "random actions": wins(blind, noise(), episodes),
         "idle": wins(blind, constant((0, 0, 0)), episodes),
@@ -173,25 +184,39 @@ def parser() -> Parser:
     p.add_weights()
     p.add_argument("--episodes", type=at_least(1), default=100, help="test episodes for each")
     p.add_argument("--seed", type=at_least(0), default=0, help="that the weights were trained with")
-    p.add_argument("--out", type=Path, metavar="DIR", help="folder of the table (runs/controls)")
+    p.add_argument(
+        "--out", type=Path, default=Path("runs/controls"), metavar="DIR", help="its folder"
+    )
     return p
 
 
 def main(argv: list[str]) -> None:
     """Print the table and write it. Raises InputError for a mistake in the arguments."""
     args = parser().read(argv)
-    torch.set_num_threads(1)  # for single frames a second thread costs more than it brings
-    out = args.out or Path("runs/controls")
     weights = args.weights or tasks.WEIGHTS / args.task
-    make_folder(out)
-    path = out / f"{args.task}.json"
-    found = {str(j): compare(args.task, weights, j, args.episodes, args.seed) for j in JITTERS}
-    note = {"task": args.task, "episodes": args.episodes, "seed": args.seed, "success": found}
-    write_atomic(path, json.dumps(note, indent=1) + "\n")
+    make_folder(args.out)
+    note = measure(args.task, weights, args.episodes, args.seed)
+    write_atomic(args.out / f"{args.task}.json", json.dumps(note, indent=1) + "\n")
     print(table(note), end="")
 
 
-def table(note: dict) -> str:
+def measure(
+    task: str, weights: Path, episodes: int, seed: int, brief: bool = False
+) -> dict[str, Any]:
+    """`compare` at every jitter of `JITTERS`, with what was asked beside it.
+
+    brief: at the first jitter alone, with hardly any trials, for a smoke run.
+    """
+    torch.set_num_threads(1)  # for single frames a second thread costs more than it brings
+    few = {"library": 2, "trials": 1} if brief else {}
+    found = {
+        str(jitter): compare(task, weights, jitter, episodes, seed, **few)
+        for jitter in (JITTERS[:1] if brief else JITTERS)
+    }
+    return {"task": task, "episodes": episodes, "seed": seed, "success": found}
+
+
+def table(note: dict[str, Any]) -> str:
     """What `main` wrote, as Markdown: a row a robot, a column a jitter, with 95 % intervals."""
     success, n = note["success"], note["episodes"]
 

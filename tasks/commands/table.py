@@ -16,8 +16,8 @@ import tasks
 from lbw_minimal.report import wilson
 from lbw_minimal.training import write_atomic
 from tasks.commands import Parser, at_least
-from tasks.commands.job import TEST_EPISODES
 from tasks.commands.batch import Job, Row, print_missing, read, run_missing
+from tasks.commands.job import TEST_EPISODES
 
 SEEDS = 3
 RIVAL_SEEDS = 2

@@ -1,0 +1,318 @@
+"""The paper by one command: its tables and figures, made here, and some that it should have had.
+
+Out: a folder with the runs, `paper.md`, `paper.html`, and figures as PNG and SVG. What is missing
+is run first, what is finished is not repeated. Each item of the page names the command for it.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import mistune
+import numpy as np
+from matplotlib.figure import Figure
+
+import tasks
+from lbw_minimal import cyclegan, transporter, video
+from lbw_minimal.imitate import load_perception
+from lbw_minimal.pictures import data_uri, draw_keypoints, enlarge
+from lbw_minimal.report_texts import CSS, HTML
+from lbw_minimal.training import write_atomic
+from tasks.commands import Parser, at_least, controls, figures, make_folder
+from tasks.commands.batch import Job, folder, read, run_missing
+from tasks.commands.job import TEST_EPISODES
+from tasks.commands.probe import NAMES, PROBE_SEED, probe
+from tasks.commands.table import METHODS, RIVALS, markdown, percent, table_two
+from tasks.world import record_expert, record_random
+
+TABLE_I = {  # frames of the human and of the robot that the paper's perception learns from
+    "reach": (1056, 3150),
+    "push": (398, 1220),
+    "slide": (650, 2120),
+    "coffee": (658, 4007),
+    "drawer": (986, 2940),
+}
+LONG = ("reach", "push")  # where the rivals get three times the steps as well
+VIDEOS = {"LbW": {1: "", 5: "videos-5", 15: "videos-15"},
+          "AVID-m": {1: "avid-1", 5: "avid-5", 15: "avid"}}  # fmt: skip
+PAGE_CSS = CSS + "\nbody { max-width: 72rem }\n"
+
+
+@dataclass
+class Plan:
+    """What is asked for: how much of everything, and where it goes."""
+
+    out: Path
+    jobs: int
+    episodes: int
+    seeds: int
+    fast: bool
+
+    @property
+    def controls(self) -> int:
+        """Test episodes of each control: cheap beside a training, and compared closely."""
+        return self.episodes if self.fast else 100
+
+    @property
+    def runs(self) -> Path:
+        """The folder of the runs."""
+        return self.out / "runs"
+
+    def seeds_of(self, change: str) -> range:
+        """The seeds of a kind of run: the rivals have two, single experiments one."""
+        most = {"": self.seeds, **dict.fromkeys(RIVALS, 2)}.get(change, 1)
+        return range(min(self.seeds, most))
+
+
+def parser() -> Parser:
+    """The arguments of `paper`."""
+    p = Parser("paper", "The paper's tables and figures. What is missing is run first: for days.")
+    p.add_argument("--jobs", type=at_least(1), default=1, help="runs at a time")
+    p.add_argument("--episodes", type=at_least(1), default=TEST_EPISODES, help="test episodes")
+    p.add_argument("--seeds", type=at_least(1), default=3, help="trainings of LbW on each task")
+    p.add_argument("--fast", action="store_true", help="a smoke run through all of it")
+    p.add_argument(
+        "--out", type=Path, default=Path("runs/paper"), metavar="DIR", help="folder of the page"
+    )
+    return p
+
+
+def main(argv: list[str]) -> None:
+    """Write the page. Raises InputError for a mistake in the arguments or if a run fails."""
+    args = parser().read(argv)
+    episodes, seeds = (2, 1) if args.fast else (args.episodes, args.seeds)
+    plan = Plan(args.out, args.jobs, episodes, seeds, args.fast)
+    make_folder(plan.out / "figures")
+    run_missing(plan.runs, wanted(plan), plan.jobs, plan.episodes, fast=plan.fast)
+    print(f"paper: {write(plan)}")
+
+
+def wanted(plan: Plan) -> list[Job]:
+    """All runs of the page."""
+    changes: dict[str, tuple[str, ...]] = {"": tasks.TASKS, **dict.fromkeys(RIVALS, tasks.TASKS)}
+    changes |= {f"{rival}-long": LONG for rival in RIVALS}
+    changes |= {c: ("push",) for n in VIDEOS.values() for c in n.values() if c not in changes}
+    if plan.fast:
+        changes = {change: t for change, t in changes.items() if change in ("", *RIVALS)}
+    return [(t, s, c) for c, some in changes.items() for t in some for s in plan.seeds_of(c)]
+
+
+def write(plan: Plan) -> Path:
+    """Write the page from finished runs, and return it."""
+    runs: dict[tuple[str, str], list] = {}
+    for task, seed, change in wanted(plan):
+        runs.setdefault((task, change), []).append(read(plan.runs, task, seed, change))
+    items: list[tuple[str, str, str]] = [
+        ("Figure 2: the method", "paper", method(plan)),
+        ("Task overview", "paper", overview(plan)),
+        ("Table I: frames that perception learns from", "paper", table_one()),
+        ("Table II: success rates, ours / the paper's", "table --rivals", table_two(runs)),
+        ("Success over environment steps", "table --rivals", over_steps(plan)),
+        ("Does it need to see?", "controls TASK", needs_eyes(plan)),
+        ("Figure 5: translations of push", "push --method avid", translations(plan)),
+        ("What keypoints know after each translation", "probe push", perception(plan)),
+    ]
+    if not plan.fast:
+        items += [
+            ("The rivals with three times the steps", "paper", long_runs(runs)),
+            ("Success over human videos, push", "push --videos N", over_videos(runs)),
+        ]
+    text = "# Learning by Watching, made again\n"
+    if plan.fast:
+        text += "\nA smoke run: no stage ran long enough to learn, and the figures say nothing.\n"
+    for title, command, body in items:
+        text += f"\n## {title}\n\n{body}\n`python -m tasks {command}`\n"
+    write_atomic(plan.out / "paper.md", text)
+    body = str(mistune.html(text))
+    for path in sorted((plan.out / "figures").glob("*.svg")):  # the page needs no other file
+        body = body.replace(f"figures/{path.name}", data_uri("image/svg+xml", path.read_bytes()))
+    page = HTML.format(title="Learning by Watching, made again", css=PAGE_CSS, body=body)
+    write_atomic(plan.out / "paper.html", page)
+    return plan.out / "paper.html"
+
+
+def shown(plan: Plan, name: str, figure: Figure, alt: str) -> str:
+    """Write a figure as PNG and SVG; what shows it in Markdown."""
+    figure.savefig(plan.out / "figures" / f"{name}.png", dpi=130)
+    figure.savefig(plan.out / "figures" / f"{name}.svg", metadata={"Date": None})
+    return f"![{alt}](figures/{name}.svg)\n"
+
+
+def demo_of(task: str) -> np.ndarray:
+    """The demonstration, (N, 84, 84, 3) uint8."""
+    return video.read(tasks.VIDEOS / task / "expert_01.mp4")[0]
+
+
+def robot_of(task: str) -> np.ndarray:
+    """The robot expert's film of the same task: for a look, not for learning."""
+    env = tasks.bare(task)
+    frames, *_ = record_expert(env, seed=0)
+    env.close()
+    return frames
+
+
+def method(plan: Plan) -> str:
+    """Figure 2 from frames of push."""
+    perception = load_perception(folder(plan.runs, "push", 0), "push")
+    demo, robot = demo_of("push"), robot_of("push")
+    perception.watch(demo)
+    i, j = len(demo) // 2, len(robot) // 2
+    z = perception.detect(robot[j : j + 1])[0]
+    figure = figures.method(demo[i], perception.translated[i], perception.z_E[i], robot[j], z)
+    return shown(plan, "method", figure, "Human video to keypoints to reward and action")
+
+
+def overview(plan: Plan) -> str:
+    """A frame of each task, human above robot."""
+    pairs = {}
+    for task in tasks.TASKS:
+        films = demo_of(task), robot_of(task)
+        human, robot = (film[round(0.55 * len(film))] for film in films)
+        pairs[task] = human, robot
+    return shown(plan, "tasks", figures.overview(pairs), "The five tasks, human above robot")
+
+
+def table_one() -> str:
+    """Frames of both domains, ours / the paper's."""
+    rows = []
+    for i, domain in enumerate(("Source (human)", "Target (robot)")):
+        cells = []
+        for task in tasks.TASKS:
+            recipe = tasks.module(task).RECIPE
+            random = video.read(tasks.VIDEOS / task / "random.mp4")[0]
+            ours = len(demo_of(task)) + len(random), recipe.robot_frames
+            cells.append(f"{ours[i]:,} / {TABLE_I[task][i]:,}")
+        rows.append([domain, *cells])
+    return markdown(["domain", *tasks.TASKS], rows)
+
+
+def over_steps(plan: Plan) -> str:
+    """Curves of all methods."""
+    logs: dict[str, dict[str, list]] = {task: {} for task in tasks.TASKS}
+    for task in tasks.TASKS:
+        for change in ("", *RIVALS):
+            paths = [folder(plan.runs, task, s, change) for s in plan.seeds_of(change)]
+            logs[task][METHODS[change][0]] = [
+                json.loads((path / "policy_log.json").read_text()) for path in paths
+            ]
+    return shown(plan, "steps", figures.over_steps(logs), "Success over environment steps")
+
+
+def needs_eyes(plan: Plan) -> str:
+    """The controls of all tasks, of LbW's first seed."""
+
+    def note_of(task):
+        path = plan.out / "controls" / f"{task}.json"
+        if not path.exists():
+            make_folder(path.parent)
+            note = controls.measure(
+                task, folder(plan.runs, task, 0), plan.controls, 0, brief=plan.fast
+            )
+            write_atomic(path, json.dumps(note, indent=1) + "\n")
+        return json.loads(path.read_text())
+
+    notes = [note_of(task) for task in tasks.TASKS]
+    found = {note["task"]: note["success"] for note in notes}
+    figure = figures.over_jitter(found, notes[0]["episodes"])
+    tables = "\n".join(controls.table(note) for note in notes)
+    return (
+        shown(plan, "controls", figure, "Success of the controls over start jitter") + "\n" + tables
+    )
+
+
+@dataclass
+class Cycled:
+    """CycleGAN's frames, and a detector that learnt on them as LbW's did on MUNIT's."""
+
+    model: cyclegan.CycleGAN
+    detector: transporter.Transporter
+    z_E: np.ndarray
+
+    @classmethod
+    def learn(cls, plan: Plan) -> Cycled:
+        """From AVID-m's run on push; its detector is trained once."""
+        out = folder(plan.runs, "push", 0, "avid")
+        model, path = (
+            cyclegan.load(out / "translation.safetensors", "push"),
+            out / "keypoints.safetensors",
+        )
+        demo = demo_of("push")
+        if not path.exists():
+            random = video.read(tasks.VIDEOS / "push" / "random.mp4")[0]
+            recipe = json.loads((folder(plan.runs, "push", 0) / "settings.json").read_text())[
+                "recipe"
+            ]
+            env = tasks.bare("push")
+            robot, _ = record_random(env, recipe["robot_frames"], seed=0)
+            env.close()
+            v = [cyclegan.translate(model, frames) for frames in (demo, random)]
+            detector, _ = transporter.train(
+                [*v, robot], iterations=recipe["transporter_iterations"], K=recipe["K"], seed=0
+            )
+            transporter.save(path, detector, "push")
+        detector = transporter.load(path, "push")
+        return cls(model, detector, transporter.detect(detector, cyclegan.translate(model, demo)))
+
+    def translate(self, frames: np.ndarray) -> np.ndarray:
+        """Human frames (T, 84, 84, 3) uint8 as CycleGAN makes the robot's of them."""
+        return cyclegan.translate(self.model, frames)
+
+    def detect(self, frames: np.ndarray) -> np.ndarray:
+        """Keypoints (T, K, 2)."""
+        return transporter.detect(self.detector, frames)
+
+
+def translations(plan: Plan) -> str:
+    """Figure 5: push's video as each method translates it, and the keypoints found on that."""
+    munit, cycled = load_perception(folder(plan.runs, "push", 0), "push"), Cycled.learn(plan)
+    demo = demo_of("push")
+    munit.watch(demo)
+    rows = {
+        "human": enlarge(demo, 4),
+        "CycleGAN": enlarge(cycled.translate(demo), 4),
+        "MUNIT": enlarge(munit.translated, 4),
+        "MUNIT's\nkeypoints": draw_keypoints(munit.translated, munit.z_E, 4),
+    }
+    return shown(plan, "push", figures.strips(rows), "Push: human, CycleGAN, MUNIT, keypoints")
+
+
+def perception(plan: Plan) -> str:
+    """R² of tip and object on push's translated frames, by translation."""
+    path = plan.out / "perception.json"
+    if not path.exists():
+        munit = load_perception(folder(plan.runs, "push", 0), "push")
+        munit.watch(demo_of("push"))
+        seers: dict[str, Any] = {"MUNIT": munit, "CycleGAN": Cycled.learn(plan)}
+        found = {name: probe("push", seer, PROBE_SEED) for name, seer in seers.items()}
+        write_atomic(path, json.dumps(found, indent=1) + "\n")
+    scores = json.loads(path.read_text())
+    rows = [
+        [f"{name}, {where}", *("-" if s["r2"] is None else f"{s['r2']:.3f}" for s in cells)]
+        for name, found in scores.items()
+        for where in ("translated", "transfer")
+        for cells in [[found[where][n] for n in NAMES]]
+    ]
+    return markdown(["frames", *(name.replace("_", " ") for name in NAMES)], rows)
+
+
+def long_runs(runs: dict[tuple[str, str], list]) -> str:
+    """The rivals' rates with the usual steps and three times as many."""
+    rows = [
+        [METHODS[rival][0], task, percent(runs[task, rival]), percent(runs[task, f"{rival}-long"])]
+        for rival in RIVALS
+        for task in LONG
+    ]
+    return markdown(["method", "task", "usual steps", "three times the steps"], rows)
+
+
+def over_videos(runs: dict[tuple[str, str], list]) -> str:
+    """Push's rate by the number of human videos."""
+    numbers = next(iter(VIDEOS.values()))
+    rows = [
+        [name, *(percent(runs["push", change]) for change in changes.values())]
+        for name, changes in VIDEOS.items()
+    ]
+    return markdown(["human videos", *map(str, numbers)], rows)

@@ -1,0 +1,104 @@
+"""The paper's page: which runs it asks for, its tables by hand, and that it stands alone."""
+
+import re
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import tasks
+from tasks.commands import figures, paper
+from tasks.commands.batch import folder
+
+
+def plan(out, **more):
+    return paper.Plan(**{"out": out, "jobs": 1, "episodes": 10, "seeds": 3, "fast": False} | more)
+
+
+def rows(*wins):
+    return [{"wins": n, "episodes": 10} for n in wins]
+
+
+def test_the_runs_are_those_of_the_tables_and_each_is_asked_for_once(tmp_path):
+    wanted = paper.wanted(plan(tmp_path))
+    assert len(wanted) == len(set(wanted))
+    count = {change: sum(c == change for *_, c in wanted) for *_, change in wanted}
+    assert count == {
+        "": 15, "classifier": 10, "avid": 10, "classifier-long": 2, "avid-long": 2,
+        "videos-5": 1, "videos-15": 1, "avid-1": 1, "avid-5": 1,
+    }  # fmt: skip
+    smoke = paper.wanted(plan(tmp_path, seeds=1, fast=True))
+    assert len(smoke) == 15 and {s for _, s, _ in smoke} == {0}
+    assert folder(tmp_path, *wanted[0]) == tmp_path / "reach-0"
+
+
+def test_table_one_counts_the_frames_that_are_there():
+    head, _, human, robot = paper.table_one().splitlines()
+    assert head == "| domain | reach | push | slide | coffee | drawer |"
+    # Table I: 1,056 and 398 human frames, 1,220 and 4,007 of the robot
+    assert "| 398 / 398 |" in human and "| 1,056 / 1,056 |" in human
+    assert "| 1,220 / 1,220 |" in robot and "| 4,007 / 4,007 |" in robot
+
+
+def test_tables_of_steps_and_videos_by_hand():
+    runs = {("reach", "avid"): rows(3), ("reach", "avid-long"): rows(10)}
+    runs |= {("push", "avid"): rows(0), ("push", "avid-long"): rows(5)}
+    runs |= {(t, c.replace("avid", "classifier")): r for (t, c), r in runs.items()}
+    lines = paper.long_runs(runs).splitlines()
+    assert lines[-2] == "| AVID-m | reach | 30 % (11-60) | 100 % (72-100) |"
+    runs |= {("push", c): rows(10) for c in ("", "videos-5", "videos-15", "avid-1", "avid-5")}
+    lines = paper.over_videos(runs).splitlines()
+    assert lines[0] == "| human videos | 1 | 5 | 15 |"
+    assert lines[-1] == "| AVID-m | 100 % (72-100) | 100 % (72-100) | 0 % (0-28) |"
+
+
+@pytest.fixture
+def page(tmp_path, monkeypatch):
+    """The page of a smoke run, of which only what takes no training is real."""
+    figure = Figure()
+    figure.subplots().plot([0, 1])
+    asked = plan(tmp_path, seeds=1, fast=True, episodes=2)
+    (tmp_path / "figures").mkdir()
+    row = {"wins": 1, "episodes": 2, "stages": {"policy": 60}}
+    monkeypatch.setattr(paper, "read", lambda *_: row)
+    for name in ("method", "over_steps", "needs_eyes", "translations", "perception"):
+        shown = paper.shown(asked, name, figure, name)
+        monkeypatch.setattr(paper, name, lambda plan, shown=shown: shown)
+    return paper.write(asked)
+
+
+def test_the_page_needs_no_other_file_and_names_a_command_for_each_item(page):
+    html, text = page.read_text(), page.with_suffix(".md").read_text()
+    assert 'src="figures/' not in html and "http" not in re.sub(r"http://www.w3.org\S*", "", html)
+    assert html.count("<img") == text.count("![") == 6
+    for part in text.split("\n## ")[1:]:
+        assert "`python -m tasks " in part.splitlines()[-1]
+    assert "Table II" in text and "<table>" in html and "smoke run" in text
+
+
+def test_figures_of_the_page_are_png_and_svg(page):
+    names = {path.name for path in (page.parent / "figures").iterdir()}
+    assert {"tasks.png", "tasks.svg"} <= names
+    assert {name.partition(".")[2] for name in names} == {"png", "svg"}
+
+
+def test_the_overview_shows_both_arms_of_every_task():
+    frame = np.full((84, 84, 3), 90, np.uint8)
+    figure = figures.overview({task: (frame, frame // 2) for task in tasks.TASKS})
+    shown = [axis.images[0].get_array() for axis in figure.axes]
+    assert len(shown) == 10
+    assert [int(image[0, 0, 0]) for image in shown] == 5 * [90] + 5 * [45]
+
+
+def test_curves_are_means_of_the_last_episodes():
+    log = [{"step": 10 * (i + 1), "success": i >= 2} for i in range(4)]
+    axis = figures.over_steps({"push": {"LbW": [log]}}, last=2).axes[0]
+    np.testing.assert_allclose(axis.lines[0].get_ydata(), [0, 0, 0.5, 1])
+
+
+def test_controls_are_drawn_as_shares_with_their_interval():
+    figure = figures.over_jitter({"push": {"0.005": {"idle": 0}, "0.02": {"idle": 5}}}, 10)
+    (axis,) = figure.axes
+    np.testing.assert_allclose(axis.lines[0].get_xydata(), [[5, 0], [20, 0.5]])
+    low, high = np.sort(axis.collections[0].get_paths()[0].vertices[:, 1])[[0, -1]]
+    assert low == pytest.approx(0) and high == pytest.approx(0.763, abs=0.001)  # Wilson, 5 of 10
