@@ -147,13 +147,14 @@ def test_table_of_a_cluster_that_loses_a_node_and_a_worker_is_that_of_one_machin
     out, killed, kept = tmp_path / "table", [], {}
 
     def kill():
-        """A worker when it has begun the second run; a node when it has begun the fifth."""
-        for begun, which in ((2, 2), (5, 1)):
+        """A worker when the second run has begun; a node and its worker when the fifth has."""
+        for begun, which in ((2, [2]), (5, [1, 2])):
             while not starts.exists() or starts.read_text().count("\n") < begun:
                 time.sleep(0.05)
             run = starts.read_text().splitlines()[begun - 1].split()
             kept.update({p: p.stat().st_mtime_ns for p in out.glob("*/metrics.json")})
-            os.kill(int(run[which]), signal.SIGKILL)
+            for i in which:
+                os.kill(int(run[i]), signal.SIGKILL)
             killed.append(run)
 
     thread = threading.Thread(target=kill, daemon=True)
@@ -232,14 +233,14 @@ def test_what_a_node_refuses_another_does_and_it_is_said(nodes, capsys):
             raise ValueError("three")
         return i * i
 
-    jobs = [(i, (able[:1], i)) for i in range(8)]
-    found = dict(cluster.spread(fussy, jobs, 1 << 20))
+    jobs = [(i, (able[:1], i), 1 << 20) for i in range(8)]
+    found = dict(cluster.spread(fussy, jobs))
     failed = found.pop(3)
     assert found == {i: i * i for i in range(8) if i != 3}
     assert isinstance(failed, ValueError) and str(failed) == "three"
     assert capsys.readouterr().err.count("not here") == 1
     with pytest.raises(InputError, match=r"no node takes these jobs.*not here.*not here"):
-        list(cluster.spread(fussy, [(i, (able, i)) for i in range(4)], 1 << 20))
+        list(cluster.spread(fussy, [(i, (able, i), 1 << 20) for i in range(4)]))
 
 
 def test_a_sandbox_that_does_not_hold_is_found(monkeypatch):

@@ -45,6 +45,7 @@ def connect() -> Any:
         ) from None
     if not ray.is_initialized():
         os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+        os.environ.setdefault("RAY_OVERRIDE_RUNTIME_ENV_DEFAULT_EXCLUDES", "")  # ours say it all
         others = [f"/{path.name}" for path in ROOT.iterdir() if path.name not in SHIPPED]
         options: dict[str, Any] = {"logging_level": "warning"}
         options["runtime_env"] = {"working_dir": str(ROOT), "excludes": others}
@@ -55,26 +56,24 @@ def connect() -> Any:
     return ray
 
 
-def spread(
-    function: Callable, jobs: Iterable[tuple[Any, tuple]], memory: int
-) -> Iterator[tuple[Any, Any]]:
-    """function(*arguments) for each (name, arguments) of `jobs`, a core and `memory` bytes each.
+def spread(function: Callable, jobs: Iterable[tuple[Any, tuple, int]]) -> Iterator[tuple[Any, Any]]:
+    """function(*arguments) for each (name, arguments, bytes of memory) of `jobs`, a core each.
 
     Yields (name, result) in the order in which they end; the result is an exception where the
     function raised one or its worker was lost too often. Raises InputError if all nodes refuse.
     """
     ray = connect()
-    task = ray.remote(num_cpus=1, memory=memory, max_retries=RETRIES)(attempt)
+    task = ray.remote(num_cpus=1, max_retries=RETRIES)(attempt)
     refused: dict[str, str] = {}  # by node
 
-    def start(arguments):
+    def start(arguments, memory):
         there = {"ray.io/node-id": f"!in({','.join(refused)})"} if refused else None
-        return task.options(label_selector=there).remote(function, arguments)
+        return task.options(memory=memory, label_selector=there).remote(function, arguments)
 
-    waiting = {start(arguments): (name, arguments) for name, arguments in jobs}
+    waiting = {start(*job): (name, *job) for name, *job in jobs}
     while waiting:
         ref = ray.wait(list(waiting))[0][0]
-        name, arguments = waiting.pop(ref)
+        name, *job = waiting.pop(ref)
         try:
             result, node, why = ray.get(ref)
         except ray.exceptions.RayError as error:
@@ -89,7 +88,7 @@ def spread(
         able = (n["NodeID"] for n in ray.nodes() if n["Alive"] and n["Resources"].get("CPU"))
         if refused.keys() >= set(able):
             raise InputError(f"--ray: no node takes these jobs. {'. '.join(refused.values())}")
-        waiting[start(arguments)] = name, arguments
+        waiting[start(*job)] = (name, *job)
 
 
 def attempt(function: Callable, arguments: tuple) -> tuple[Any, str, str]:

@@ -20,7 +20,7 @@ Packed = list[tuple[str, int, bytes]]  # name, size and bytes; none of what is t
 
 def spread(jobs: list[tuple[Path, tuple]]) -> Iterator[tuple]:
     """`grade_here` on a cluster, see `spread` there. Nothing to do needs no cluster."""
-    return cluster.spread(grade_here, jobs, MEMORY) if jobs else iter(())
+    return cluster.spread(grade_here, [(*job, MEMORY) for job in jobs]) if jobs else iter(())
 
 
 def pack(notebooks: list[Path], entry: Path) -> Packed:
