@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from lbw_minimal.report import wilson
 from lbw_minimal.reward import MENDS
 from lbw_minimal.training import InputError
 from tasks import TASKS, WEIGHTS
@@ -201,3 +202,15 @@ def test_repeated_runs_are_as_good_as_the_readme_says():
     slide = ["slide", *(f"slide-again-{seed}" for seed in range(3))]
     assert [sum(hundred.pop(name)) for name in slide] == [97, 96, 96, 100]
     assert all(all(won) for won in hundred.values())
+
+
+def test_runs_with_moved_starts_are_as_good_as_their_table_says():
+    runs = [read(RESULTS / "jitter" / f"{task}-0" / "metrics.json") for task in TASKS]
+    assert all(run["settings"]["jitter"] == 0.02 for run in runs)
+    lines = []
+    for task, run in zip(TASKS, runs, strict=True):
+        wins, n = sum(e["success"] for e in run["episodes"]), len(run["episodes"])
+        low, high = (round(100 * bound) for bound in wilson(wins, n))
+        lines.append([task, f"{wins}/{n}", f"{low}-{high} %"])
+    text = table.markdown(["task", "success", "95 % interval"], lines)
+    assert text in (RESULTS / "README.md").read_text()
