@@ -36,6 +36,7 @@ FAST = {
     "robot_frames": 200,
     "classifier_iterations": 200,
 }
+FAST_PIXELS = {"policy_steps": 600}  # a hundred updates, each of which takes ten of LbW's
 TRANSLATION = ("robot_frames", "munit_iterations", "munit_width")
 PERCEPTION = (*TRANSLATION, "transporter_iterations", "K", "shift", "hue")
 RIVALS = ("classifier_iterations", "clip", "pixel_updates")  # fields that only they have
@@ -102,7 +103,8 @@ def check(name: str, args: argparse.Namespace, argv: list[str]) -> Job:
     from_scratch = lbw and (args.from_scratch or args.fast or args.video is not None)
     refuse_idle_options(args, from_scratch)
     module = tasks.module(name)
-    recipe = dataclasses.replace(module.RECIPE, **FAST) if args.fast else module.RECIPE
+    fast = FAST if lbw else FAST | FAST_PIXELS
+    recipe = dataclasses.replace(module.RECIPE, **fast) if args.fast else module.RECIPE
     recipe = dataclasses.replace(recipe, **read_settings(args.set, args.method, from_scratch))
     pick_device(args.device or "cpu")
     torch.set_num_threads(args.threads or os.cpu_count() or 1)
