@@ -22,7 +22,7 @@ from lbw_minimal.images import to_images
 from lbw_minimal.training import (
     Checkpoint,
     InputError,
-    load_state,
+    load_weights,
     pick_device,
     progress,
     save_state,
@@ -208,15 +208,7 @@ def load(path: Path | str, task: str | None = None) -> GoalClassifier:
 
     Raises InputError if the file holds something else or belongs to another task.
     """
-    saved = load_state(path)
-    if saved.get("kind") != "classifier":
-        raise InputError(
-            f"{path}: not the weights of a goal classifier; give the file that its training wrote."
-        )
-    if task is not None and saved["task"] != task:
-        raise InputError(
-            f"{path}: weights of the task {saved['task']}, not of {task}; give those of {task}."
-        )
+    saved = load_weights(path, "classifier", "a goal classifier", task)
     model = GoalClassifier()
     model.load_state_dict(saved["model"])
     return model.eval().requires_grad_(False)

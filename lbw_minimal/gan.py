@@ -16,9 +16,10 @@ import torch
 import torch.nn.functional as F
 from torch import nn
 
+from lbw_minimal import training
 from lbw_minimal.images import median_frame, to_frames, to_images
 from lbw_minimal.munit_networks import Critic
-from lbw_minimal.training import InputError, load_state, save_state
+from lbw_minimal.training import save_state
 
 # Not in the paper: weights of what differs from the median frame, see `motion_weight`.
 MOTION_L1 = 4.0  # with 0 the L1 losses forget the object, which covers 1 % of the picture
@@ -141,15 +142,8 @@ def load_weights(path: Path | str, kind: type[Model], task: str) -> tuple[Model,
 
     Raises InputError if the file holds something else or belongs to another task.
     """
-    saved = load_state(path)
-    if saved.get("kind") != kind.__name__.lower():
-        raise InputError(
-            f"{path}: not the weights of a {kind.__name__}; give the file that its training wrote."
-        )
-    if saved["task"] != task:
-        raise InputError(
-            f"{path}: weights of the task {saved['task']}, not of {task}; give those or train anew."
-        )
+    name = kind.__name__
+    saved = training.load_weights(path, name.lower(), f"a {name}", task)
     model = kind(**saved["sizes"])
     with torch.no_grad():
         for name, p in model.named_parameters():

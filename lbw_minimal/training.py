@@ -100,6 +100,25 @@ def load_state(path: Path | str) -> dict:
     return _unflatten(tree, tensors)
 
 
+def load_weights(path: Path | str, kind: str, called: str, task: str | None) -> dict:
+    """What `save_state` wrote, if it is of this kind and task; any task's if `task` is None.
+
+    called: what a sentence calls the kind, as "a MUNIT". Raises InputError if the file holds
+    something else or belongs to another task.
+    """
+    saved = load_state(path)
+    if saved.get("kind") != kind:
+        raise InputError(
+            f"{path}: not the weights of {called}; give the file that its training wrote."
+        )
+    if task is not None and saved["task"] != task:
+        raise InputError(
+            f"{path}: weights of the task {saved['task']}, not of {task}; "
+            f"give those of {task} or train anew."
+        )
+    return saved
+
+
 def _state_of(thing):
     is_generator = isinstance(thing, np.random.Generator)
     return thing.bit_generator.state if is_generator else thing.state_dict()

@@ -23,7 +23,7 @@ from lbw_minimal.images import median_frame, motion_weight, to_images
 from lbw_minimal.training import (
     Checkpoint,
     InputError,
-    load_state,
+    load_weights,
     pick_device,
     progress,
     save_state,
@@ -308,15 +308,7 @@ def load(path: Path | str, task: str | None = None) -> Transporter:
 
     Raises InputError if the file holds something else or belongs to another task.
     """
-    saved = load_state(path)
-    if saved.get("kind") != "transporter":
-        raise InputError(
-            f"{path}: not the weights of a Transporter; give the file that its training wrote."
-        )
-    if task is not None and saved["task"] != task:
-        raise InputError(
-            f"{path}: weights of the task {saved['task']}, not of {task}; give those of {task}."
-        )
+    saved = load_weights(path, "transporter", "a Transporter", task)
     model = Transporter(saved["K"])
     model.load_state_dict(saved["model"])
     return model.eval()

@@ -24,8 +24,8 @@ from lbw_minimal.imitate import Perception, Recipe, Run, load_perception
 from lbw_minimal.reward import MENDS
 from lbw_minimal.training import InputError, pick_device, write_atomic
 from tasks.commands import JITTER, Parser, at_least, make_folder, metres
+from tasks.commands.record import EXPERTS
 
-EXPERTS = 15  # human videos of a task, as many as AVID-m learns from in the paper
 TEST_EPISODES = 10  # as in the paper
 RESULTS = ("*.checkpoint", "*.frames", "*.safetensors", "*_log.json", "metrics.json", "report.html")
 FAST = {

@@ -17,7 +17,7 @@ from tasks.commands import JITTER, Parser
 from tasks.world import Recording, expert_takes, random_takes, save_recordings
 from tasks.world.scene import FPS
 
-EXPERTS = 15  # videos of the task being done; the method learns from the first alone
+EXPERTS = 15  # videos of the task being done: AVID-m learns from all, LbW from the first alone
 
 
 def parser() -> Parser:
