@@ -57,13 +57,13 @@ def trained_perception(name: str, weights: Path | None = None) -> Perception:
     return perception
 
 
-def pace_film(name: str, seed: int = 0) -> np.ndarray:
-    """Random robot motion (T, 84, 84, 3) uint8, as much as shows the robot's pace."""
+def pace_film(name: str, seed: int = 0, frames: int | None = None) -> np.ndarray:
+    """Random robot motion (frames, 84, 84, 3) uint8; None: as much as shows the robot's pace."""
     from lbw_minimal.imitate import PACE
     from tasks.world import record_random
 
     env = bare(name)
-    robot, _ = record_random(env, PACE, seed=seed)
+    robot, _ = record_random(env, frames or PACE, seed=seed)
     env.close()
     return robot
 

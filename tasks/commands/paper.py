@@ -26,7 +26,7 @@ from tasks.commands.batch import Job, folder, read, run_missing
 from tasks.commands.job import TEST_EPISODES
 from tasks.commands.probe import NAMES, PROBE_SEED, probe
 from tasks.commands.table import METHODS, RIVALS, markdown, percent, table_two
-from tasks.world import record_expert, record_random
+from tasks.world import record_expert
 
 TABLE_I = {  # frames of the human and of the robot that the paper's perception learns from
     "reach": (1056, 3150),
@@ -245,9 +245,7 @@ class Cycled:
             recipe = json.loads((folder(plan.runs, "push", 0) / "settings.json").read_text())[
                 "recipe"
             ]
-            env = tasks.bare("push")
-            robot, _ = record_random(env, recipe["robot_frames"], seed=0)
-            env.close()
+            robot = tasks.pace_film("push", 0, recipe["robot_frames"])
             v = [cyclegan.translate(model, frames) for frames in (demo, random)]
             detector, _ = transporter.train(
                 [*v, robot], iterations=recipe["transporter_iterations"], K=recipe["K"], seed=0

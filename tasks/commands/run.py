@@ -24,7 +24,7 @@ from lbw_minimal.report import wilson, write_report
 from lbw_minimal.training import InputError, seed_everything
 from tasks.commands.job import TEST_EPISODES, Job, check, parser
 from tasks.commands.probe import PROBE_SEED, probe
-from tasks.world import TaskEnv, record_random
+from tasks.world import TaskEnv
 from tasks.world.viewer import mirror
 
 TEST_SEED = 1_000_000  # first seed of the test episodes, far from those of training
@@ -70,9 +70,7 @@ def perceive(job: Job) -> tuple[Perception, np.ndarray]:
 def film_robot(job: Job, frames: int) -> np.ndarray:
     """Random robot motion, (frames, 84, 84, 3) uint8; the time it takes goes to the metrics."""
     start = time.monotonic()
-    env = tasks.bare(job.name)
-    robot, _ = record_random(env, frames, seed=job.args.seed)
-    env.close()
+    robot = tasks.pace_film(job.name, job.args.seed, frames)
     job.run.metrics["stages"]["robot_video"] = round(time.monotonic() - start, 1)
     return robot
 
