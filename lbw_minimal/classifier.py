@@ -80,8 +80,11 @@ class GoalClassifier(nn.Module):
     that took ten times as long.
     """
 
-    def __init__(self) -> None:
+    longest: torch.Tensor  # () int64: steps of the longest video that it was shown
+
+    def __init__(self, longest: int = 0) -> None:
         super().__init__()
+        self.register_buffer("longest", torch.tensor(longest))
         self.layers = nn.Sequential(
             nn.Conv2d(3, 8, 4, 2, 1),  # (B, 8, 24, 24)
             nn.ReLU(),

@@ -46,7 +46,9 @@ class Recipe:
     updates: int = 2  # of SAC's networks, an environment step
     entropy: float = -1.0  # SAC's target at first, per number of an action; it falls to -3.5
     # The rivals' alone, see `rivals.py`.
+    motion: int = 0  # 1: CycleGAN with MUNIT's motion weights
     classifier_iterations: int = 10_000
+    random_negatives: int = 0  # 1: random robot motion is among the classifier's negatives
     clip: float = 10.0  # of the classifier's logit
     pixel_updates: int = 1  # of SAC+AE's networks, an environment step
 

@@ -32,6 +32,7 @@ Videos = list[np.ndarray]  # each (T, 84, 84, 3) uint8
 def classifier_reward(
     env: gym.Env,
     videos: Videos,
+    random: np.ndarray,
     recipe: Recipe,
     *,
     task: str,
@@ -41,11 +42,12 @@ def classifier_reward(
 ) -> tuple[Policy, gym.Env]:
     """Learn a policy for `env` from expert videos of the robot itself.
 
-    Returns it and `env` wrapped so that its observations are the policy's. device: where the
-    classifier learns.
+    random (T, 84, 84, 3) uint8: further frames of the robot that show no goal, or none of them, as
+    in the paper. Returns the policy and `env` wrapped so that its observations are the policy's.
+    device: where the classifier learns.
     """
-    model = learn_goals(videos, recipe, task=task, seed=seed, run=run, device=device)
-    return learn_from_pixels(env, videos, model, recipe, seed=seed, run=run)
+    model = learn_goals(videos, random, recipe, task=task, seed=seed, run=run, device=device)
+    return learn_from_pixels(env, model, recipe, seed=seed, run=run)
 
 
 def avid_m(
@@ -69,8 +71,9 @@ def avid_m(
         experts[0], random, robot, recipe, task=task, seed=seed, run=run, device=device
     )
     translated = [cyclegan.translate(G, video) for video in experts]
-    model = learn_goals(translated, recipe, task=task, seed=seed, run=run, device=device)
-    return learn_from_pixels(env, translated, model, recipe, seed=seed, run=run)
+    others = robot if recipe.random_negatives else robot[:0]
+    model = learn_goals(translated, others, recipe, task=task, seed=seed, run=run, device=device)
+    return learn_from_pixels(env, model, recipe, seed=seed, run=run)
 
 
 def learn_translation(
@@ -90,7 +93,8 @@ def learn_translation(
         with run.stage("translation") as checkpoint:
             G, log = cyclegan.train(
                 np.concatenate([demo, random]), robot, iterations=recipe.munit_iterations,
-                width=recipe.munit_width, seed=seed, device=device, checkpoint=checkpoint,
+                width=recipe.munit_width, motion=bool(recipe.motion), seed=seed, device=device,
+                checkpoint=checkpoint,
             )  # fmt: skip
             run.log("translation_log", log)
             cyclegan.save(path, G, task)
@@ -98,37 +102,45 @@ def learn_translation(
 
 
 def learn_goals(
-    videos: Videos, recipe: Recipe, *, task: str, seed: int, run: Run, device: str = "cpu"
+    videos: Videos,
+    others: np.ndarray,
+    recipe: Recipe,
+    *,
+    task: str,
+    seed: int,
+    run: Run,
+    device: str = "cpu",
 ) -> GoalClassifier:
-    """The goal classifier: the last tenth of each video against the rest."""
+    """The goal classifier: the last tenth of each video against the rest, and `others`."""
     path = run.out / "classifier.safetensors"
     if not path.exists():
         with run.stage("classifier") as checkpoint:
+            positive, negative = classifier.goal_frames(videos)
             model, log = classifier.train(
-                *classifier.goal_frames(videos), iterations=recipe.classifier_iterations,
-                seed=seed, device=device, checkpoint=checkpoint,
+                positive, np.concatenate([negative, others]),
+                iterations=recipe.classifier_iterations, seed=seed, device=device,
+                checkpoint=checkpoint,
             )  # fmt: skip
+            model.longest.fill_(max(map(len, videos)))
             run.log("classifier_log", log)
             classifier.save(path, model, task)
     return classifier.load(path, task)
 
 
-def watched(
-    env: gym.Env, videos: Videos, model: GoalClassifier, clip: float = classifier.CLIP
-) -> gym.Env:
+def watched(env: gym.Env, model: GoalClassifier, clip: float = classifier.CLIP) -> gym.Env:
     """`env` as a rival's agent sees it: the last three frames, and the classifier's reward.
 
-    An episode ends some time after the longest video does, as LbW's after its demonstration.
+    An episode ends some time after the classifier's longest video, as LbW's after its
+    demonstration.
     """
     horizon = env.spec.max_episode_steps if env.spec else None
-    episode = round(max(map(len, videos)) / MOST_OF_HORIZON)
+    episode = round(model.longest.item() / MOST_OF_HORIZON)
     env = ClassifierRewardWrapper(env, ClassifierReward(model, clip))
     return TimeLimit(FrameStackObservation(env, STACK), min(horizon or episode, episode))
 
 
 def learn_from_pixels(
     env: gym.Env,
-    videos: Videos,
     model: GoalClassifier,
     recipe: Recipe,
     *,
@@ -136,7 +148,7 @@ def learn_from_pixels(
     run: Run,
 ) -> tuple[Policy, gym.Env]:
     """SAC+AE on the classifier's reward."""
-    env = watched(env, videos, model, recipe.clip)
+    env = watched(env, model, recipe.clip)
     path = run.out / "policy.safetensors"
     if not path.exists():
         with run.stage("policy") as checkpoint:

@@ -77,9 +77,11 @@ def robot_experts(name: str, jitter: float) -> Iterator[tuple[np.ndarray, Record
     from tasks.world import expert_takes
 
     env = bare(name, jitter=jitter)
-    for frames, _, recording in expert_takes(env, ROBOT_EXPERTS):
-        yield frames, recording
-    env.close()
+    try:
+        for frames, _, recording in expert_takes(env, ROBOT_EXPERTS):
+            yield frames, recording
+    finally:  # also if not all of them are wanted
+        env.close()
 
 
 def keypoint_env(name: str, reward: str | None = "mended", **options: Any) -> gym.Env:

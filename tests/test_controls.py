@@ -4,8 +4,12 @@ import json
 
 import gymnasium as gym
 import numpy as np
+import pytest
 
 import tasks
+from lbw_minimal import classifier, rivals, sac_ae
+from lbw_minimal.classifier import GoalClassifier
+from lbw_minimal.training import InputError
 from tasks.commands import JITTER, controls
 from tasks.commands.run import TEST_SEED
 
@@ -93,6 +97,26 @@ def test_the_blinded_cameras_show_no_news():
     assert (other != first).any()  # an episode has its own first frame
     assert {int(v) for v in grey.reset(seed=0)[0].flat} == {128}
     frozen.close(), grey.close()
+
+
+def test_a_rival_is_tested_beside_it_on_the_same_starts(tmp_path, monkeypatch):
+    model, starts = GoalClassifier(longest=3), []
+    env = rivals.watched(gym.make(tasks.id_of("reach")), model)
+    policy, _ = sac_ae.train(env, steps=4, seed=0)
+    classifier.save(tmp_path / "classifier.safetensors", model, "reach")
+    sac_ae.save(tmp_path / "policy.safetensors", policy)
+    whole = controls.play
+    monkeypatch.setattr(
+        controls,
+        "play",
+        lambda *a, **k: starts.append((a[0].observation_space.shape, a[2])) or whole(*a, **k),
+    )
+    assert controls.rival_wins("reach", tmp_path, 0.01, episodes=2) == 0
+    assert starts == [((3, 84, 84, 3), TEST_SEED), ((3, 84, 84, 3), TEST_SEED + 1)]
+    with pytest.raises(InputError, match="no run of a rival"):
+        controls.method_of(tmp_path)
+    (tmp_path / "settings.json").write_text('{"method": "avid"}')
+    assert controls.method_of(tmp_path) == "AVID-m"
 
 
 def test_the_shipped_policy_reaches_and_idle_does_not(tmp_path, capsys, monkeypatch):

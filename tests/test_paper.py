@@ -24,8 +24,8 @@ def test_the_runs_are_those_of_the_tables_and_each_is_asked_for_once(tmp_path):
     assert len(wanted) == len(set(wanted))
     count = {change: sum(c == change for *_, c in wanted) for *_, change in wanted}
     assert count == {
-        "": 15, "classifier": 10, "avid": 10, "classifier-long": 2, "avid-long": 2,
-        "videos-5": 1, "videos-15": 1, "avid-1": 1, "avid-5": 1,
+        "": 15, "wide": 15, "classifier": 10, "avid": 10, "classifier-long": 2, "avid-long": 2,
+        "avid-motion": 1, "videos-5": 1, "videos-15": 1, "avid-1": 1, "avid-5": 1,
     }  # fmt: skip
     smoke = paper.wanted(plan(tmp_path, seeds=1, fast=True))
     assert len(smoke) == 15 and {s for _, s, _ in smoke} == {0}
@@ -50,6 +50,9 @@ def test_tables_of_steps_and_videos_by_hand():
     lines = paper.over_videos(runs).splitlines()
     assert lines[0] == "| human videos | 1 | 5 | 15 |"
     assert lines[-1] == "| AVID-m | 100 % (72-100) | 100 % (72-100) | 0 % (0-28) |"
+    runs |= {(t, "wide"): [row | {"steps": 3000} for row in rows(9, 10)] for t in tasks.TASKS}
+    lines = paper.trained_wide(runs).splitlines()
+    assert lines[3] == "| push | 95 % (76-99) | 9/10, 10/10 | 3,000 |"
 
 
 @pytest.fixture
@@ -59,11 +62,11 @@ def page(tmp_path, monkeypatch):
     figure.subplots().plot([0, 1])
     asked = plan(tmp_path, seeds=1, fast=True, episodes=2)
     (tmp_path / "figures").mkdir()
-    row = {"wins": 1, "episodes": 2, "stages": {"policy": 60}}
+    row = {"wins": 1, "episodes": 2, "stages": {"policy": 60}, "steps": 1000}
     monkeypatch.setattr(paper, "read", lambda *_: row)
-    for name in ("method", "over_steps", "needs_eyes", "translations", "perception"):
+    for name in ("method", "over_steps", "needs_eyes", "translated", "perception"):
         shown = paper.shown(asked, name, figure, name)
-        monkeypatch.setattr(paper, name, lambda plan, shown=shown: shown)
+        monkeypatch.setattr(paper, name, lambda *_, shown=shown: shown)
     return paper.write(asked)
 
 

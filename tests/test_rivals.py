@@ -39,18 +39,23 @@ ARGS = {"task": "reach", "seed": 0}
 def test_the_classifier_reward_goes_from_videos_to_a_policy_and_repeats_nothing(
     tmp_path, monkeypatch
 ):
-    videos = [film(30, seed=i) for i in range(2)]
-    policy, env = rivals.classifier_reward(reach(), videos, TINY, run=run_in(tmp_path), **ARGS)
+    videos = [film(30 + 5 * i, seed=i) for i in range(2)]
+    policy, env = rivals.classifier_reward(
+        reach(), videos, videos[0][:0], TINY, run=run_in(tmp_path), **ARGS
+    )
     obs, _ = env.reset(seed=0)
     assert obs.shape == (3, 84, 84, 3)
     assert policy.act(obs, deterministic=True).shape == (3,)
     for module in (classifier, sac_ae):
         monkeypatch.setattr(module, "train", lambda *_, **__: pytest.fail("trained again"))
-    again, _ = rivals.classifier_reward(reach(), videos, TINY, run=run_in(tmp_path), **ARGS)
+    again, _ = rivals.classifier_reward(
+        reach(), videos, videos[0][:0], TINY, run=run_in(tmp_path), **ARGS
+    )
     np.testing.assert_array_equal(
         again.act(obs, deterministic=True), policy.act(obs, deterministic=True)
     )
     assert set(run_in(tmp_path).metrics["stages"]) == {"classifier", "policy"}
+    assert classifier.load(tmp_path / "classifier.safetensors").longest == 35
 
 
 def test_avids_classifier_is_shown_translated_videos_of_all_experts(tmp_path, monkeypatch):
@@ -78,7 +83,7 @@ def test_avids_classifier_is_shown_translated_videos_of_all_experts(tmp_path, mo
 
 @pytest.mark.parametrize(("longest", "steps"), [(20, 25), (500, tasks.module("reach").HORIZON)])
 def test_an_episode_lasts_as_long_as_the_longest_video_asks_and_the_task_allows(longest, steps):
-    env = rivals.watched(reach(), [film(5), film(longest)], classifier.GoalClassifier())
+    env = rivals.watched(reach(), classifier.GoalClassifier(longest))
     env.reset(seed=0)
     count, ended = 0, False
     while not ended:
@@ -88,9 +93,9 @@ def test_an_episode_lasts_as_long_as_the_longest_video_asks_and_the_task_allows(
 
 
 def test_the_clip_of_the_recipe_bounds_the_reward():
-    model = classifier.GoalClassifier()
+    model = classifier.GoalClassifier(20)
     model.layers[-1].bias.data.fill_(7.0)
-    env = rivals.watched(reach(), [film(20)], model, clip=2.0)
+    env = rivals.watched(reach(), model, clip=2.0)
     env.reset(seed=0)
     _, reward, *_, info = env.step(np.zeros(3, np.float32))
     assert reward == 2.0 and info["reward_parts"]["logit"] > 5
@@ -121,11 +126,31 @@ def test_a_rivals_run_ends_with_a_page_and_is_replayed(method, tmp_path, capfd, 
         assert episodes == metrics["episodes"]
 
 
+def test_avid_learns_on_a_translation_that_is_there(tmp_path, monkeypatch, capfd):
+    monkeypatch.setattr(tasks, "ROBOT_EXPERTS", 2)
+    monkeypatch.setattr(job, "EXPERTS", 2)
+    robot, human = film(8, 200), film(8, 60)
+    G, _ = cyclegan.train(human, robot, iterations=1, width=4, seed=0)
+    cyclegan.save(tmp_path / "translation.safetensors", G, "reach")
+    monkeypatch.setattr(cyclegan, "train", lambda *_, **__: pytest.fail("trained again"))
+    line = ["reach", "--method", "avid", "--weights", str(tmp_path), "--set", "policy_steps=20"]
+    line += ["--set", "classifier_iterations=2", "--threads", "1"]
+    out = tmp_path / "run"
+    assert main([*line, "--set", "motion=1", "--out", str(out)]) == 2
+    assert "--set motion=1: the translation in --weights" in capfd.readouterr().err
+    monkeypatch.setattr(tasks, "pace_film", lambda *_: robot)
+    assert main([*line, "--episodes", "1", "--out", str(out)]) == 0
+    stages = json.loads((out / "metrics.json").read_text())["stages"]
+    assert "translation" not in stages and {"classifier", "policy"} <= set(stages)
+    assert main([*line, "--out", str(tmp_path)]) == 2
+    assert "clear it of the weights" in capfd.readouterr().err
+    assert (tmp_path / "translation.safetensors").exists()
+
+
 REFUSED = {
     "--reward literal": "--reward literal",
     "--without trim": "--without trim",
     "--from-scratch": "--from-scratch",
-    "--weights x": "--weights x",
     "--evaluate": "--weights",
     "--set K=3": "no 'K'",
     "--video x.mp4": "--video x.mp4",

@@ -63,7 +63,10 @@ def test_the_rivals_stand_above_lbw_as_in_the_paper(runs):
         for seed in range(2):
             finish(batch.folder(runs, task, seed, "classifier"), 3 * seed)
             finish(batch.folder(runs, task, seed, "avid"), 1)
-    *_, head, _, classifier, avid, lbw = table.table(runs, jobs=1, rivals=True).splitlines()
+    *_, two, single = table.table(runs, jobs=1, rivals=True).split("\n\n")
+    assert len(single.splitlines()) == 2 + 3 * 2
+    assert "| Classifier reward | slide | 0/10, 3/10 | 10,000 | 0.2 h |" in single
+    head, _, classifier, avid, lbw = two.splitlines()
     assert head == "| method | expert videos | push | slide | time |"
     # 3 of 20: Wilson 5.2 to 36.0 %; 2 of 20: 2.8 to 30.1 %
     rate = "15 % (5-36)"
@@ -88,6 +91,10 @@ def test_a_rival_is_run_alone_with_perception_of_its_own(tmp_path, monkeypatch):
     (line,) = started
     assert line.endswith("--method avid") and "--weights" not in line
     assert f"--out {tmp_path / 'push-1-avid'}" in line
+    batch.run_missing(tmp_path, [("push", 0, "avid-5"), ("push", 0, "avid")], 1, episodes=10)
+    _, first, then = started  # the translation of the one serves the other
+    assert f"--out {tmp_path / 'push-0-avid'} " in first
+    assert then.endswith(f"--weights {tmp_path / 'push-0-avid'} --method avid --videos 5")
 
 
 def test_ablation_has_a_row_a_mend_and_a_picture(runs):

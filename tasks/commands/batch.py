@@ -18,22 +18,28 @@ from lbw_minimal.reward import MENDS
 from lbw_minimal.training import InputError, write_atomic
 from tasks.commands import cluster, make_folder
 
-# Arguments of a run by its change; "" is the recipe. These train perception of their own ...
+# Arguments of a run by its change; "" is the recipe. These train all of their networks ...
 ALONE = {
     "": ["--from-scratch"],
     "classifier": ["--method", "classifier"],
     "avid": ["--method", "avid"],
+    "avid-motion": ["--method", "avid", "--set", "motion=1"],
     # Three times the steps that reach and push have.
     "classifier-long": ["--method", "classifier", "--set", "policy_steps=9000"],
-    "avid-long": ["--method", "avid", "--set", "policy_steps=9000"],
-    # Other numbers of human videos than 1 and 15.
+    # Other numbers of human videos than 1.
     "videos-5": ["--from-scratch", "--videos", "5"],
     "videos-15": ["--from-scratch", "--videos", "15"],
-    "avid-1": ["--method", "avid", "--videos", "1"],
-    "avid-5": ["--method", "avid", "--videos", "5"],
 }
-# ... and these learn on the perception of the unchanged run.
-LATER = {"literal": ["--reward", "literal"]} | {mend: ["--without", mend] for mend in MENDS}
+# ... and these learn on the perception, or the translation, of a run named here.
+LATER = {
+    "literal": ("", ["--reward", "literal"]),
+    **{mend: ("", ["--without", mend]) for mend in MENDS},
+    "wide": ("", ["--jitter", "0.02"]),
+    "avid-long": ("avid", ["--method", "avid", "--set", "policy_steps=9000"]),
+    # Other numbers of human videos than 15: the translation sees one of them in any case.
+    "avid-1": ("avid", ["--method", "avid", "--videos", "1"]),
+    "avid-5": ("avid", ["--method", "avid", "--videos", "5"]),
+}
 RUN = ("-m", "tasks")  # Python's arguments, before those of `command`
 Job = tuple[str, int, str]  # task, seed, change
 Row = dict[str, Any]  # a finished run, see `read`
@@ -60,19 +66,23 @@ def command(
     if change in ALONE:
         args += ALONE[change]
     else:
-        args += ["--weights", str(folder(out, task, seed)), *LATER[change]]
+        first, more = LATER[change]
+        args += ["--weights", str(folder(out, task, seed, first)), *more]
     args += ["--fast"] * fast
     return args + ["--resume"] * (path / "settings.json").exists()
 
 
 def memory(change: str) -> int:
     """Bytes a run is given on a cluster: LbW's largest took 1.4e9, a rival's stays under 4e9."""
-    return 4_000_000_000 if "--method" in ALONE.get(change, ()) else 1_500_000_000
+    return 4_000_000_000 if change.startswith(("avid", "classifier")) else 1_500_000_000
 
 
 def missing(out: Path, wanted: list[Job], episodes: int) -> tuple[list[Job], list[Job]]:
     """The runs that are not finished: those that stand alone, then those that need one of them."""
-    alone = [(task, seed, change if change in ALONE else "") for task, seed, change in wanted]
+    alone = [
+        (task, seed, change if change in ALONE else LATER[change][0])
+        for task, seed, change in wanted
+    ]
     both = list(dict.fromkeys(alone)), [job for job in wanted if job[2] not in ALONE]
     first, then = ([j for j in some if not finished(folder(out, *j), episodes)] for some in both)
     return first, then
@@ -85,8 +95,8 @@ def print_missing(out: Path, wanted: list[Job], episodes: int) -> None:
         print(shlex.join(["python", *RUN, *command(out, *job, episodes)]))
     if first and then:
         print(
-            f"The first {len(first)} may run side by side; the other {len(then)} learn on their "
-            "perception, and may run side by side when those have ended.",
+            f"The first {len(first)} may run side by side; the other {len(then)} learn on networks "
+            "of those, and may run side by side when they have ended.",
             file=sys.stderr,
         )
 
@@ -99,7 +109,7 @@ def run_missing(
     ray: bool = False,
     fast: bool = False,
 ) -> None:
-    """Run what is not finished, `jobs` at a time or on a Ray cluster, perception first.
+    """Run what is not finished, `jobs` at a time or on a Ray cluster, in the order it takes.
 
     fast: smoke runs, on this machine. A finished run with another number of test episodes is
     tested again, not trained. Raises InputError if a run fails.
@@ -132,10 +142,10 @@ def run_on_cluster(out: Path, jobs: list[Job], episodes: int) -> None:
     """
 
     def packed(job):
-        path, base = folder(out, *job), folder(out, *job[:2])
+        later = job[2] in LATER
+        path, base = folder(out, *job), folder(out, *job[:2], LATER[job[2]][0] if later else "")
         there = {str(p): f"runs/{p.name}" for p in (path, base)}
         line = [*RUN, *(there.get(word, word) for word in command(out, *job, episodes))]
-        later = job[2] in LATER
         files = {there[str(base)]: cluster.pack(base, "*.safetensors")} if later else {}
         return line, files | {there[str(path)]: cluster.pack(path)}, there[str(path)]
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -19,13 +19,13 @@ import torch
 from gymnasium.wrappers import TimeLimit
 
 import tasks
-from lbw_minimal import sac
+from lbw_minimal import classifier, rivals, sac, sac_ae
 from lbw_minimal.imitate import watched
 from lbw_minimal.report import wilson
-from lbw_minimal.training import write_atomic
+from lbw_minimal.training import InputError, write_atomic
 from tasks.commands import JITTER, Parser, at_least, make_folder
 from tasks.commands.run import TEST_SEED
-from tasks.commands.table import markdown
+from tasks.commands.table import METHODS, markdown
 
 JITTERS = (JITTER, 0.01, 0.02, 0.04)  # m
 TRIAL_SEED, TRIALS = 2_000_000, 10  # starts on which blind robots are chosen
@@ -120,20 +120,32 @@ def best(env: gym.Env, robots: list[Robot], trials: int) -> Robot:
     return max(robots, key=lambda robot: wins(env, robot, trials, TRIAL_SEED))
 
 
+def rival_wins(task: str, run: Path, jitter: float, episodes: int) -> int:
+    """Successful episodes of a rival's policy; run: the folder of its run."""
+    model = classifier.load(run / "classifier.safetensors", task)
+    policy = sac_ae.load(run / "policy.safetensors")
+    env = rivals.watched(gym.make(tasks.id_of(task), jitter=jitter), model)
+    count = wins(env, lambda obs, t: policy.act(obs, deterministic=True), episodes)
+    env.close()
+    return count
+
+
 def compare(
     task: str,
     weights: Path,
     jitter: float,
     episodes: int,
     seed: int,
+    beside: Mapping[str, Path],
     library: int = LIBRARY,
     trials: int = TRIALS,
 ) -> dict[str, int]:
     """Successes of the policy in `weights` and of every control, with starts moved by `jitter` (m).
 
-    seed: that of the training, whose film of the robot set the demonstration's pace. library:
-    episodes of the policy that are kept for replays; trials: episodes that choose a blind robot.
-    Raises InputError if weights are missing, damaged, or another task's.
+    seed: that of the training, whose film of the robot set the demonstration's pace. beside: names
+    and folders of rivals' runs. library: episodes of the policy that are kept for replays; trials:
+    episodes that choose a blind robot. Raises InputError if weights are missing, damaged, or
+    another task's.
     """
     perception = tasks.trained_perception(task, weights)
     policy = sac.load(weights / "policy.safetensors")
@@ -148,6 +160,8 @@ def compare(
 
     env, reward = seen_through()
     found = {"the policy": wins(env, trained, episodes)}
+    for name, run in beside.items():
+        found[name] = rival_wins(task, run, jitter, episodes)
     for name, camera in (("its camera frozen", Frozen), ("its camera grey", Grey)):
         blinded = seen_through(camera)[0]
         found[name] = wins(blinded, trained, episodes)
@@ -185,6 +199,9 @@ def parser() -> Parser:
     p.add_argument("--episodes", type=at_least(1), default=100, help="test episodes for each")
     p.add_argument("--seed", type=at_least(0), default=0, help="that the weights were trained with")
     p.add_argument(
+        "--beside", type=Path, action="append", default=[], metavar="DIR", help="a rival's run"
+    )
+    p.add_argument(
         "--out", type=Path, default=Path("runs/controls"), metavar="DIR", help="its folder"
     )
     return p
@@ -195,13 +212,28 @@ def main(argv: list[str]) -> None:
     args = parser().read(argv)
     weights = args.weights or tasks.WEIGHTS / args.task
     make_folder(args.out)
-    note = measure(args.task, weights, args.episodes, args.seed)
+    beside = {method_of(run): run for run in args.beside}
+    note = measure(args.task, weights, args.episodes, args.seed, beside)
     write_atomic(args.out / f"{args.task}.json", json.dumps(note, indent=1) + "\n")
     print(table(note), end="")
 
 
+def method_of(run: Path) -> str:
+    """The paper's name of the rival whose run is in that folder. Raises InputError for others."""
+    note = run / "settings.json"
+    method = json.loads(note.read_text())["method"] if note.exists() else "lbw"
+    if method not in METHODS:
+        raise InputError(f"--beside {run}: no run of a rival is there.")
+    return METHODS[method][0]
+
+
 def measure(
-    task: str, weights: Path, episodes: int, seed: int, brief: bool = False
+    task: str,
+    weights: Path,
+    episodes: int,
+    seed: int,
+    beside: Mapping[str, Path],
+    brief: bool = False,
 ) -> dict[str, Any]:
     """`compare` at every jitter of `JITTERS`, with what was asked beside it.
 
@@ -210,7 +242,7 @@ def measure(
     torch.set_num_threads(1)  # for single frames a second thread costs more than it brings
     few = {"library": 2, "trials": 1} if brief else {}
     found = {
-        str(jitter): compare(task, weights, jitter, episodes, seed, **few)
+        str(jitter): compare(task, weights, jitter, episodes, seed, beside, **few)
         for jitter in (JITTERS[:1] if brief else JITTERS)
     }
     return {"task": task, "episodes": episodes, "seed": seed, "success": found}

@@ -39,10 +39,11 @@ FAST = {
 FAST_PIXELS = {"policy_steps": 600}  # a hundred updates, each of which takes ten of LbW's
 TRANSLATION = ("robot_frames", "munit_iterations", "munit_width")
 PERCEPTION = (*TRANSLATION, "transporter_iterations", "K", "shift", "hue")
-RIVALS = ("classifier_iterations", "clip", "pixel_updates")  # fields that only they have
+# Fields that only the rivals have.
+RIVALS = ("classifier_iterations", "random_negatives", "clip", "pixel_updates")
 METHODS = {  # and the fields of the recipe that each of them has
     "lbw": ("human_frames", *PERCEPTION, "policy_steps", "updates", "entropy"),
-    "avid": ("human_frames", *TRANSLATION, *RIVALS, "policy_steps", "entropy"),
+    "avid": ("human_frames", *TRANSLATION, "motion", *RIVALS, "policy_steps", "entropy"),
     "classifier": (*RIVALS, "policy_steps", "entropy"),
 }
 
@@ -105,7 +106,7 @@ def check(name: str, args: argparse.Namespace, argv: list[str]) -> Job:
     module = tasks.module(name)
     fast = FAST if lbw else FAST | FAST_PIXELS
     recipe = dataclasses.replace(module.RECIPE, **fast) if args.fast else module.RECIPE
-    recipe = dataclasses.replace(recipe, **read_settings(args.set, args.method, from_scratch))
+    recipe = dataclasses.replace(recipe, **read_settings(args, from_scratch))
     pick_device(args.device or "cpu")
     torch.set_num_threads(args.threads or os.cpu_count() or 1)
 
@@ -113,10 +114,14 @@ def check(name: str, args: argparse.Namespace, argv: list[str]) -> Job:
     random = experts[0][:0] if args.video else read_video(tasks.VIDEOS / name / "random.mp4")
     if lbw:  # whose demonstration is one: the translation sees the others beside random motion
         random = np.concatenate([random, *experts[1:]])
-    weights = args.weights or tasks.WEIGHTS / name
+    weights, out = args.weights or tasks.WEIGHTS / name, args.out or Path("runs") / name
+    if weights.resolve() == out.resolve():
+        raise InputError(f"{out}: the run would clear it of the weights; give another --out.")
     perception = load_perception(weights, name) if lbw and not from_scratch else None
     if args.evaluate:
         check_weights(weights, name, args.method)
+    elif args.method == "avid" and args.weights:
+        cyclegan.load(weights / "translation.safetensors", name)
 
     settings = {
         "task": name,
@@ -131,7 +136,7 @@ def check(name: str, args: argparse.Namespace, argv: list[str]) -> Job:
         "set": sorted(args.set),
         "recipe": fields_of(recipe, args.method),
     }
-    run = Run(prepare_folder(args.out or Path("runs") / name, settings, args.resume))
+    run = Run(prepare_folder(out, settings, args.resume))
     command = shlex.join(["python", "-m", "tasks", name, *argv])
     run.metrics["command"] = command
     run.metrics["settings"] = settings
@@ -196,7 +201,8 @@ def refuse_idle_options(args: argparse.Namespace, from_scratch: bool) -> None:
                  ("--reward", args.reward if args.reward != "mended" else None, why)]  # fmt: skip
         idle += [("--video", args.video, "the rivals learn from many videos")]
         if not args.evaluate:
-            idle += [("--weights", args.weights, "a rival trains all of them anew")]
+            why = "the classifier reward trains all of its networks anew"
+            idle += [("--weights", args.weights if args.method == "classifier" else None, why)]
         elif args.weights is None:
             raise InputError("--evaluate: the kit has no rivals' weights; name a run by --weights.")
     elif args.reward == "literal":
@@ -217,21 +223,27 @@ def refuse_idle_options(args: argparse.Namespace, from_scratch: bool) -> None:
             raise InputError(f"{option}{value} does nothing here: {why}.")
 
 
-def read_settings(given: list[str], method: str, from_scratch: bool) -> dict[str, Any]:
+def read_settings(args: argparse.Namespace, from_scratch: bool) -> dict[str, Any]:
     """The recipe's fields that `--set NAME=VALUE` names, with values of the fields' types."""
+    method = args.method
+    fixed: tuple[str, ...] = ()  # fields of networks that are not trained here
+    if method == "lbw" and not from_scratch:
+        fixed, why = PERCEPTION, "perception is not trained here; add --from-scratch"
+    elif method == "avid" and args.weights:
+        fixed, why = (*TRANSLATION, "motion"), "the translation in --weights is not trained here"
     fields = {field.name: field for field in dataclasses.fields(Recipe)}
     fields = {name: fields[name] for name in fields_of(Recipe(0, 0), method)}
     fields.pop("human_frames", None)  # `record` films so many; here the videos have what they have
     out = {}
-    for text in given:
+    for text in args.set:
         name, _, value = text.partition("=")
         if name not in fields:
             raise InputError(
                 f"--set {text}: the recipe of --method {method} has no {name!r}; "
                 f"it has {', '.join(fields)}."
             )
-        if method == "lbw" and name in PERCEPTION and not from_scratch:
-            raise InputError(f"--set {text}: perception is not trained here; add --from-scratch.")
+        if name in fixed:
+            raise InputError(f"--set {text}: {why}.")
         out[name] = read_number(text, value, whole=fields[name].type == "int")
     return out
 

@@ -9,23 +9,30 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import mistune
 import numpy as np
 from matplotlib.figure import Figure
 
 import tasks
-from lbw_minimal import cyclegan, transporter, video
-from lbw_minimal.imitate import load_perception
-from lbw_minimal.pictures import data_uri, draw_keypoints, enlarge
+from lbw_minimal import video
+from lbw_minimal.pictures import data_uri
 from lbw_minimal.report_texts import CSS, HTML
 from lbw_minimal.training import write_atomic
-from tasks.commands import Parser, at_least, controls, figures, make_folder
+from tasks.commands import Parser, at_least, controls, figures, make_folder, translations
 from tasks.commands.batch import Job, folder, read, run_missing
 from tasks.commands.job import TEST_EPISODES
-from tasks.commands.probe import NAMES, PROBE_SEED, probe
-from tasks.commands.table import METHODS, RIVALS, markdown, percent, table_two
+from tasks.commands.probe import NAMES
+from tasks.commands.table import (
+    METHODS,
+    RIVALS,
+    each,
+    every_run,
+    markdown,
+    percent,
+    table_two,
+)
+from tasks.commands.translations import demo_of
 from tasks.world import record_expert
 
 TABLE_I = {  # frames of the human and of the robot that the paper's perception learns from
@@ -38,10 +45,10 @@ TABLE_I = {  # frames of the human and of the robot that the paper's perception 
 LONG = ("reach", "push")  # where the rivals get three times the steps as well
 VIDEOS = {"LbW": {1: "", 5: "videos-5", 15: "videos-15"},
           "AVID-m": {1: "avid-1", 5: "avid-5", 15: "avid"}}  # fmt: skip
-PAGE_CSS = CSS + "\nbody { max-width: 72rem }\n"
+PAGE_CSS = CSS + "\nbody { max-width: 72rem }\np:has(img) { max-width: none }\n"
 
 
-@dataclass
+@dataclass(frozen=True)
 class Plan:
     """What is asked for: how much of everything, and where it goes."""
 
@@ -57,13 +64,19 @@ class Plan:
         return self.episodes if self.fast else 100
 
     @property
+    def cycles(self) -> dict[str, str]:
+        """The forms of CycleGAN, and AVID-m's runs with them."""
+        more = {} if self.fast else {"CycleGAN with motion weights": "avid-motion"}
+        return {"CycleGAN": "avid"} | more
+
+    @property
     def runs(self) -> Path:
         """The folder of the runs."""
         return self.out / "runs"
 
     def seeds_of(self, change: str) -> range:
         """The seeds of a kind of run: the rivals have two, single experiments one."""
-        most = {"": self.seeds, **dict.fromkeys(RIVALS, 2)}.get(change, 1)
+        most = {"": self.seeds, "wide": self.seeds, **dict.fromkeys(RIVALS, 2)}.get(change, 1)
         return range(min(self.seeds, most))
 
 
@@ -92,8 +105,8 @@ def main(argv: list[str]) -> None:
 
 def wanted(plan: Plan) -> list[Job]:
     """All runs of the page."""
-    changes: dict[str, tuple[str, ...]] = {"": tasks.TASKS, **dict.fromkeys(RIVALS, tasks.TASKS)}
-    changes |= {f"{rival}-long": LONG for rival in RIVALS}
+    changes: dict[str, tuple[str, ...]] = dict.fromkeys(("", *RIVALS, "wide"), tasks.TASKS)
+    changes |= {f"{rival}-long": LONG for rival in RIVALS} | {"avid-motion": ("push",)}
     changes |= {c: ("push",) for n in VIDEOS.values() for c in n.values() if c not in changes}
     if plan.fast:
         changes = {change: t for change, t in changes.items() if change in ("", *RIVALS)}
@@ -110,13 +123,16 @@ def write(plan: Plan) -> Path:
         ("Task overview", "paper", overview(plan)),
         ("Table I: frames that perception learns from", "paper", table_one()),
         ("Table II: success rates, ours / the paper's", "table --rivals", table_two(runs)),
+        ("Table II, run by run", "table --rivals", every_run(runs)),
         ("Success over environment steps", "table --rivals", over_steps(plan)),
-        ("Does it need to see?", "controls TASK", needs_eyes(plan)),
-        ("Figure 5: translations of push", "push --method avid", translations(plan)),
+        ("Does it need to see?", "controls TASK", needs_eyes(plan, "")),
+        ("Figure 5: translations of push", "push --method avid", translated(plan)),
         ("What keypoints know after each translation", "probe push", perception(plan)),
     ]
     if not plan.fast:
         items += [
+            ("Trained with starts moved by 2 cm", "TASK --jitter 0.02", trained_wide(runs)),
+            ("Does that need to see?", "controls TASK --weights DIR", needs_eyes(plan, "wide")),
             ("The rivals with three times the steps", "paper", long_runs(runs)),
             ("Success over human videos, push", "push --videos N", over_videos(runs)),
         ]
@@ -141,11 +157,6 @@ def shown(plan: Plan, name: str, figure: Figure, alt: str) -> str:
     return f"![{alt}](figures/{name}.svg)\n"
 
 
-def demo_of(task: str) -> np.ndarray:
-    """The demonstration, (N, 84, 84, 3) uint8."""
-    return video.read(tasks.VIDEOS / task / "expert_01.mp4")[0]
-
-
 def robot_of(task: str) -> np.ndarray:
     """The robot expert's film of the same task: for a look, not for learning."""
     env = tasks.bare(task)
@@ -156,9 +167,7 @@ def robot_of(task: str) -> np.ndarray:
 
 def method(plan: Plan) -> str:
     """Figure 2 from frames of push."""
-    perception = load_perception(folder(plan.runs, "push", 0), "push")
-    demo, robot = demo_of("push"), robot_of("push")
-    perception.watch(demo)
+    perception, demo, robot = translations.munit(plan.runs), demo_of("push"), robot_of("push")
     i, j = len(demo) // 2, len(robot) // 2
     z = perception.detect(robot[j : j + 1])[0]
     figure = figures.method(demo[i], perception.translated[i], perception.z_E[i], robot[j], z)
@@ -201,15 +210,19 @@ def over_steps(plan: Plan) -> str:
     return shown(plan, "steps", figures.over_steps(logs), "Success over environment steps")
 
 
-def needs_eyes(plan: Plan) -> str:
-    """The controls of all tasks, of LbW's first seed."""
+def needs_eyes(plan: Plan, change: str) -> str:
+    """The controls of all tasks, of LbW's first seed, and beside the recipe the rivals'."""
+    name = change or "controls"
 
     def note_of(task):
-        path = plan.out / "controls" / f"{task}.json"
+        path = plan.out / name / f"{task}.json"
         if not path.exists():
             make_folder(path.parent)
+            beside = (
+                {} if change else {METHODS[c][0]: folder(plan.runs, task, 0, c) for c in RIVALS}
+            )
             note = controls.measure(
-                task, folder(plan.runs, task, 0), plan.controls, 0, brief=plan.fast
+                task, folder(plan.runs, task, 0, change), plan.controls, 0, beside, plan.fast
             )
             write_atomic(path, json.dumps(note, indent=1) + "\n")
         return json.loads(path.read_text())
@@ -218,78 +231,38 @@ def needs_eyes(plan: Plan) -> str:
     found = {note["task"]: note["success"] for note in notes}
     figure = figures.over_jitter(found, notes[0]["episodes"])
     tables = "\n".join(controls.table(note) for note in notes)
-    return (
-        shown(plan, "controls", figure, "Success of the controls over start jitter") + "\n" + tables
-    )
+    return shown(plan, name, figure, "Success of the controls over start jitter") + "\n" + tables
 
 
-@dataclass
-class Cycled:
-    """CycleGAN's frames, and a detector that learnt on them as LbW's did on MUNIT's."""
-
-    model: cyclegan.CycleGAN
-    detector: transporter.Transporter
-    z_E: np.ndarray
-
-    @classmethod
-    def learn(cls, plan: Plan) -> Cycled:
-        """From AVID-m's run on push; its detector is trained once."""
-        out = folder(plan.runs, "push", 0, "avid")
-        model, path = (
-            cyclegan.load(out / "translation.safetensors", "push"),
-            out / "keypoints.safetensors",
-        )
-        demo = demo_of("push")
-        if not path.exists():
-            random = video.read(tasks.VIDEOS / "push" / "random.mp4")[0]
-            recipe = json.loads((folder(plan.runs, "push", 0) / "settings.json").read_text())[
-                "recipe"
-            ]
-            robot = tasks.pace_film("push", 0, recipe["robot_frames"])
-            v = [cyclegan.translate(model, frames) for frames in (demo, random)]
-            detector, _ = transporter.train(
-                [*v, robot], iterations=recipe["transporter_iterations"], K=recipe["K"], seed=0
-            )
-            transporter.save(path, detector, "push")
-        detector = transporter.load(path, "push")
-        return cls(model, detector, transporter.detect(detector, cyclegan.translate(model, demo)))
-
-    def translate(self, frames: np.ndarray) -> np.ndarray:
-        """Human frames (T, 84, 84, 3) uint8 as CycleGAN makes the robot's of them."""
-        return cyclegan.translate(self.model, frames)
-
-    def detect(self, frames: np.ndarray) -> np.ndarray:
-        """Keypoints (T, K, 2)."""
-        return transporter.detect(self.detector, frames)
+def trained_wide(runs: dict[tuple[str, str], list]) -> str:
+    """LbW with starts moved by 2 cm in training and test."""
+    rows = [
+        [
+            task,
+            percent(runs[task, "wide"]),
+            each(runs[task, "wide"]),
+            f"{runs[task, 'wide'][0]['steps']:,}",
+        ]
+        for task in tasks.TASKS
+    ]
+    return markdown(["task", "success (95 % interval)", "by seed", "environment steps"], rows)
 
 
-def translations(plan: Plan) -> str:
+def translated(plan: Plan) -> str:
     """Figure 5: push's video as each method translates it, and the keypoints found on that."""
-    munit, cycled = load_perception(folder(plan.runs, "push", 0), "push"), Cycled.learn(plan)
-    demo = demo_of("push")
-    munit.watch(demo)
-    rows = {
-        "human": enlarge(demo, 4),
-        "CycleGAN": enlarge(cycled.translate(demo), 4),
-        "MUNIT": enlarge(munit.translated, 4),
-        "MUNIT's\nkeypoints": draw_keypoints(munit.translated, munit.z_E, 4),
-    }
-    return shown(plan, "push", figures.strips(rows), "Push: human, CycleGAN, MUNIT, keypoints")
+    figure = translations.strips(plan.runs, plan.cycles)
+    return shown(plan, "push", figure, "Push: human, CycleGAN, MUNIT, keypoints")
 
 
 def perception(plan: Plan) -> str:
     """R² of tip and object on push's translated frames, by translation."""
     path = plan.out / "perception.json"
     if not path.exists():
-        munit = load_perception(folder(plan.runs, "push", 0), "push")
-        munit.watch(demo_of("push"))
-        seers: dict[str, Any] = {"MUNIT": munit, "CycleGAN": Cycled.learn(plan)}
-        found = {name: probe("push", seer, PROBE_SEED) for name, seer in seers.items()}
+        found = translations.scores(plan.runs, plan.cycles)
         write_atomic(path, json.dumps(found, indent=1) + "\n")
-    scores = json.loads(path.read_text())
     rows = [
         [f"{name}, {where}", *("-" if s["r2"] is None else f"{s['r2']:.3f}" for s in cells)]
-        for name, found in scores.items()
+        for name, found in json.loads(path.read_text()).items()
         for where in ("translated", "transfer")
         for cells in [[found[where][n] for n in NAMES]]
     ]

@@ -10,6 +10,7 @@ import json
 import resource
 import shutil
 import time
+from itertools import islice
 from typing import Any, cast
 
 import gymnasium as gym
@@ -52,7 +53,9 @@ def perceive(job: Job) -> tuple[Perception, np.ndarray]:
     seed, most = job.args.seed, job.recipe.robot_frames
     robot = film_robot(job, most if job.from_scratch else min(PACE, most))
     perception = job.trained
-    if perception is None:
+    if perception:
+        bring(job, "translation", "keypoints")
+    else:
         seed_everything(seed)
         perception = learn_perception(
             job.demo, job.random, robot, job.recipe,
@@ -67,6 +70,12 @@ def perceive(job: Job) -> tuple[Perception, np.ndarray]:
     return perception, robot
 
 
+def bring(job: Job, *names: str) -> None:
+    """Copy trained weights to the run's folder, which so has all that its policy's replay takes."""
+    for name in names:
+        shutil.copy(job.weights / f"{name}.safetensors", job.run.out)
+
+
 def film_robot(job: Job, frames: int) -> np.ndarray:
     """Random robot motion, (frames, 84, 84, 3) uint8; the time it takes goes to the metrics."""
     start = time.monotonic()
@@ -78,16 +87,19 @@ def film_robot(job: Job, frames: int) -> np.ndarray:
 def rival(job: Job) -> tuple[sac.Policy, gym.Env, dict[str, Any]]:
     """A rival's policy, its environment, and what its classifier was shown, for the report."""
     recipe, run, device = job.recipe, job.run, job.args.device or "cpu"
-    if job.args.evaluate:
-        for file in job.weights.glob("*.safetensors"):
-            shutil.copy(file, run.out / file.name)
+    avid = job.args.method == "avid"
+    if job.args.weights:
+        bring(job, *["translation"] * avid, *["classifier", "policy"] * job.args.evaluate)
     env = gym.make(tasks.id_of(job.name), jitter=job.args.jitter)
     common = {"task": job.name, "seed": job.args.seed, "run": run, "device": device}
-    if job.args.method == "classifier":
+    if not avid:
         start = time.monotonic()
-        shown = [frames for frames, _ in tasks.robot_experts(job.name, job.args.jitter)]
+        films = tasks.robot_experts(job.name, job.args.jitter)
+        shown = [frames for frames, _ in islice(films, 1 if job.args.evaluate else None)]
         run.metrics["stages"]["robot_experts"] = round(time.monotonic() - start, 1)
-        agent, env = rivals.classifier_reward(env, shown, recipe, **common)
+        more = recipe.random_negatives and not job.args.evaluate
+        random = film_robot(job, recipe.robot_frames) if more else shown[0][:0]
+        agent, env = rivals.classifier_reward(env, shown, random, recipe, **common)
         seen: dict[str, Any] = {"demo": shown[0]}
     else:
         robot = film_robot(job, recipe.robot_frames)
@@ -102,7 +114,7 @@ def learn(job: Job, perception: Perception, robot: np.ndarray) -> tuple[sac.Poli
     """The policy, trained or replayed, and its environment."""
     torch.set_num_threads(1)  # SAC's networks are small: a second thread costs more than it gains
     if job.args.evaluate:
-        shutil.copy(job.weights / "policy.safetensors", job.run.out / "policy.safetensors")
+        bring(job, "policy")
     agent, env = imitate(
         gym.make(tasks.id_of(job.name), jitter=job.args.jitter),
         job.demo, robot, perception, job.recipe,

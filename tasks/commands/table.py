@@ -147,7 +147,7 @@ def table(
         ],
     )
     if rivals:
-        text += "\n" + table_two(runs)
+        text += "\n" + table_two(runs) + "\n" + every_run(runs)
     write_atomic(out / "table.md", text)
     write_rows(out / "table.json", runs)
     return text
@@ -167,6 +167,17 @@ def table_two(runs: dict[tuple[str, str], list[Row]]) -> str:
         hours = sum(sum(r["stages"].values()) for r in done) / 3600
         rows.append([name, videos, *cells, f"{hours:.1f} h in {len(done)} runs"])
     return markdown(["method", "expert videos", *tasks.TASKS, "time"], rows)
+
+
+def every_run(runs: dict[tuple[str, str], list[Row]]) -> str:
+    """Every run of Table II: successes by seed, environment steps, hours of all of them."""
+    rows = []
+    for change, (name, _) in METHODS.items():
+        for task in tasks.TASKS:
+            some = runs[task, change]
+            hours = sum(sum(r["stages"].values()) for r in some) / 3600
+            rows.append([name, task, each(some), f"{some[0]['steps']:,}", f"{hours:.1f} h"])
+    return markdown(["method", "task", "by seed", "environment steps", "time"], rows)
 
 
 def success(task: str, mended: list[Row], literal: list[Row]) -> list[str]:
