@@ -186,19 +186,20 @@ def logits(model: GoalClassifier, frames: np.ndarray) -> np.ndarray:
 
 
 class ClassifierReward:
-    """The logit of the frame that a step led to, clipped to [-clip, clip].
+    """The logit of the frame that a step led to, clipped to [-clip, clip], divided by clip.
 
-    VICE takes logits and not probabilities: those are flat, 0 or 1, almost everywhere. The model is
-    frozen here for good.
+    VICE takes logits and not probabilities: those are flat, 0 or 1, almost everywhere. The division
+    is ours. A reward of about 1 a step is what SAC's first temperature is meant for; with logits as
+    they are the policy lost its noise before it had found a goal. The model is frozen for good.
     """
 
     def __init__(self, model: GoalClassifier, clip: float = CLIP):
         self.model, self.clip = model.eval().requires_grad_(False), clip
 
     def __call__(self, frame: np.ndarray) -> tuple[float, dict[str, float]]:
-        """The reward of a step that led to `frame` (84, 84, 3) uint8, and the logit unclipped."""
+        """The reward of a step that led to `frame` (84, 84, 3) uint8, in [-1, 1], and the logit."""
         logit = float(logits(self.model, frame[None])[0])
-        return float(np.clip(logit, -self.clip, self.clip)), {"logit": logit}
+        return float(np.clip(logit / self.clip, -1, 1)), {"logit": logit}
 
 
 def save(path: Path | str, model: GoalClassifier, task: str) -> None:

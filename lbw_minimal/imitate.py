@@ -49,7 +49,7 @@ class Recipe:
     motion: int = 0  # 1: CycleGAN with MUNIT's motion weights
     classifier_iterations: int = 10_000
     random_negatives: int = 0  # 1: random robot motion is among the classifier's negatives
-    clip: float = 10.0  # of the classifier's logit
+    clip: float = 10.0  # the classifier's logit that earns a reward of 1, and the most that counts
     pixel_updates: int = 1  # of SAC+AE's networks, an environment step
 
 

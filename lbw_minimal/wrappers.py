@@ -98,7 +98,7 @@ class KeypointRewardWrapper(gym.Wrapper, RecordConstructorArgs):
 class ClassifierRewardWrapper(gym.Wrapper, RecordConstructorArgs):
     """Pays the classifier's reward for the frame a step led to; the agent sees the frames.
 
-    The unclipped logit is in `info["reward_parts"]`. As in `KeypointRewardWrapper` an episode is
+    The logit itself is in `info["reward_parts"]`. As in `KeypointRewardWrapper` an episode is
     cut and never terminated: far from the goal logits are below zero.
     """
 

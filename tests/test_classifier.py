@@ -102,12 +102,12 @@ def test_what_is_trained_is_frozen(trained, tmp_path):
         assert not any(p.requires_grad for p in frozen.parameters())
 
 
-def test_reward_is_the_logit_of_the_frame_clipped():
+def test_reward_is_the_logit_of_the_frame_clipped_to_one():
     model = GoalClassifier()
     with torch.no_grad():
         for p in model.parameters():
             p.zero_()
-    for logit, paid in ((-50.0, -3.0), (1.5, 1.5), (50.0, 3.0)):
+    for logit, paid in ((-50.0, -1.0), (1.5, 0.5), (50.0, 1.0)):
         with torch.no_grad():
             model.layers[-1].bias.fill_(logit)
         assert ClassifierReward(model, clip=3.0)(grey(0)[0]) == (paid, {"logit": logit})

@@ -98,7 +98,7 @@ def test_the_clip_of_the_recipe_bounds_the_reward():
     env = rivals.watched(reach(), model, clip=2.0)
     env.reset(seed=0)
     _, reward, *_, info = env.step(np.zeros(3, np.float32))
-    assert reward == 2.0 and info["reward_parts"]["logit"] > 5
+    assert reward == 1.0 and info["reward_parts"]["logit"] > 5
 
 
 @pytest.mark.parametrize("method", ["classifier", "avid"])

@@ -201,7 +201,7 @@ def test_the_classifiers_wrapper_cuts_an_episode_and_tells_the_logit():
     assert env.step(np.zeros(3, np.float32))[2:4] == (False, False)
     _, paid, terminated, truncated, info = env.step(np.zeros(3, np.float32))
     assert (terminated, truncated) == (False, True) and info["is_success"]
-    assert info["reward_parts"]["logit"] == pytest.approx(paid)  # too near 0 to be clipped
+    assert info["reward_parts"]["logit"] == pytest.approx(10 * paid)  # too near 0 to be clipped
 
 
 def test_our_agent_trains_on_it(reward):
