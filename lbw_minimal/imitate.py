@@ -48,9 +48,10 @@ class Recipe:
     # The rivals' alone, see `rivals.py`.
     motion: int = 0  # 1: CycleGAN with MUNIT's motion weights
     classifier_iterations: int = 10_000
-    random_negatives: int = 0  # 1: random robot motion is among the classifier's negatives
+    random_negatives: int = 0  # 1: random motion is among the classifier's negatives
     clip: float = 10.0  # the classifier's logit that earns a reward of 1, and the most that counts
     pixel_updates: int = 1  # of SAC+AE's networks, an environment step
+    hold: int = 1  # steps for which each random action is kept, before SAC+AE has learnt any
 
 
 @dataclass

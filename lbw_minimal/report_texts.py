@@ -162,8 +162,8 @@ are at most 0, and 0 means exactly as in the demonstration. Look for r1 to stay 
 back to it, until the end.</p>
 """,
     "rival": """
-<p>The goal classifier's logit of the robot's picture at each step of the test episode. The reward is
-that over the recipe's clip.</p>
+<p>The goal classifier's logit of the robot's picture at each step of the test episode. The reward
+is that, divided by the recipe's clip.</p>
 """,
 }
 

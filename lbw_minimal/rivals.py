@@ -65,13 +65,14 @@ def avid_m(
     """Learn a policy for `env` from expert videos of a human.
 
     random, robot (T, 84, 84, 3) uint8: random motion of the human and of the robot. The translation
-    learns from the frames that LbW's learns from: of the experts only the first is among them.
+    learns from the frames that LbW's learns from: of the experts only the first is among them. The
+    classifier sees translated frames alone: among real ones it would learn to tell the two apart.
     """
     G = learn_translation(
         experts[0], random, robot, recipe, task=task, seed=seed, run=run, device=device
     )
     translated = [cyclegan.translate(G, video) for video in experts]
-    others = robot if recipe.random_negatives else robot[:0]
+    others = cyclegan.translate(G, random) if recipe.random_negatives else random[:0]
     model = learn_goals(translated, others, recipe, task=task, seed=seed, run=run, device=device)
     return learn_from_pixels(env, model, recipe, seed=seed, run=run)
 
@@ -154,7 +155,7 @@ def learn_from_pixels(
         with run.stage("policy") as checkpoint:
             agent, log = sac_ae.train(
                 env, steps=recipe.policy_steps, updates=recipe.pixel_updates,
-                entropy=recipe.entropy, seed=seed, checkpoint=checkpoint,
+                hold=recipe.hold, entropy=recipe.entropy, seed=seed, checkpoint=checkpoint,
             )  # fmt: skip
             run.log("policy_log", log)
             sac_ae.save(path, agent)

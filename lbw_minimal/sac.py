@@ -237,10 +237,11 @@ def learn(
     updates: int,
     random_steps: int,
     batch: int,
+    hold: int = 1,
 ) -> list[dict]:
     """The loop of `train`, for any agent that is a `SAC` and any buffer with its methods.
 
-    Returns the log.
+    hold: steps for which a random action is kept. Returns the log.
     """
     checkpoint = checkpoint or Checkpoint(None)
     stateful = {"sac": sac, "buffer": buffer, "rng": rng}
@@ -252,8 +253,10 @@ def learn(
         obs, _ = env.reset(seed=_seed(seed, len(now.log)))
         sac.observe(obs)
         while not ended:
-            random = now.step < random_steps
-            action = _uniform(rng, env) if random else sac.act(obs)
+            if now.step >= random_steps:
+                action = sac.act(obs)
+            elif len(rows) % hold == 0:
+                action = _uniform(rng, env)
             next_obs, reward, terminal, truncated, info = env.step(action)
             # `truncated` stays out: the time limit is the clock's doing, and s' keeps its value.
             step = {"obs": obs, "action": action, "reward": reward, "next_obs": next_obs}

@@ -175,14 +175,16 @@ def train(
     evaluate_every: int = 10,
     updates: int = 1,
     random_steps: int = 500,
+    hold: int = 1,
     **recipe: Any,
 ) -> tuple[SACAE, list[dict]]:
     """Train on `env` as `sac.train` does.
 
     env: observations (3, 84, 84, 3) uint8, the last frames as `FrameStackObservation(env, 3)` gives
-    them. size: one of `SIZES`. recipe: other arguments of `SACAE`. The frames are in a file beside
-    the checkpoint, with the suffix `.frames`; where there is no checkpoint they are in memory,
-    21 kB each. Raises InputError for another size or observation.
+    them. size: one of `SIZES`. hold: steps for which each random action is kept. recipe: other
+    arguments of `SACAE`. The frames are in a file beside the checkpoint, with the suffix `.frames`;
+    where there is no checkpoint they are in memory, 21 kB each. Raises InputError for another size
+    or observation.
     """
     seen = env.observation_space.shape
     if seen != (STACK, FRAME, FRAME, 3):
@@ -197,7 +199,7 @@ def train(
     log = learn(
         env, agent, buffer, rng, steps=steps, seed=seed, checkpoint=checkpoint, evaluate=evaluate,
         evaluate_every=evaluate_every, updates=updates, random_steps=random_steps,
-        batch=SIZES[size].batch,
+        batch=SIZES[size].batch, hold=hold,
     )  # fmt: skip
     return agent, log
 

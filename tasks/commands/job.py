@@ -40,7 +40,7 @@ FAST_PIXELS = {"policy_steps": 600}  # a hundred updates, each of which takes te
 TRANSLATION = ("robot_frames", "munit_iterations", "munit_width")
 PERCEPTION = (*TRANSLATION, "transporter_iterations", "K", "shift", "hue")
 # Fields that only the rivals have.
-RIVALS = ("classifier_iterations", "random_negatives", "clip", "pixel_updates")
+RIVALS = ("classifier_iterations", "random_negatives", "clip", "pixel_updates", "hold")
 METHODS = {  # and the fields of the recipe that each of them has
     "lbw": ("human_frames", *PERCEPTION, "policy_steps", "updates", "entropy"),
     "avid": ("human_frames", *TRANSLATION, "motion", *RIVALS, "policy_steps", "entropy"),

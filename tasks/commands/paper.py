@@ -45,12 +45,15 @@ TABLE_I = {  # frames of the human and of the robot that the paper's perception 
 LONG = ("reach", "push")  # where the rivals get three times the steps as well
 VIDEOS = {"LbW": {1: "", 5: "videos-5", 15: "videos-15"},
           "AVID-m": {1: "avid-1", 5: "avid-5", 15: "avid"}}  # fmt: skip
-PAGE_CSS = CSS + """
+PAGE_CSS = (
+    CSS
+    + """
 body { max-width: 72rem }
 p:has(img) { max-width: none; overflow-x: auto }
 td, th { white-space: nowrap }
 @media screen and (max-width: 40rem) { p > img { max-width: none; width: 44rem } }
 """
+)
 
 
 @dataclass(frozen=True)
