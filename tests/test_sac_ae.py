@@ -412,6 +412,24 @@ def test_a_resumed_run_ends_as_the_uninterrupted_one(tmp_path):
         assert all(equal(values(getattr(whole, name)), getattr(resumed, name))), name
 
 
+def test_the_first_random_actions_are_held_within_an_episode():
+    class Note(gym.Wrapper):
+        episodes: list[list] = []
+
+        def reset(self, **more):
+            self.episodes.append([])
+            return super().reset(**more)
+
+        def step(self, action):
+            self.episodes[-1].append(action.tolist())
+            return super().step(action)
+
+    train(Note(dot()), steps=30, seed=0, random_steps=500, hold=3)
+    for actions in Note.episodes[:3]:  # then come the trials of the last actor
+        for t, action in enumerate(actions):
+            assert (action == actions[max(t - 1, 0)]) == (t % 3 != 0 or t == 0)
+
+
 def test_a_checkpoint_holds_no_frames(tmp_path):
     """70 steps more are 1.6 MB of frames, in their file and not in the checkpoint."""
     path, sizes = tmp_path / "policy.checkpoint", []
