@@ -7,6 +7,7 @@ is run first, what is finished is not repeated. Each item of the page names the 
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -91,7 +92,7 @@ class Plan:
 def parser() -> Parser:
     """The arguments of `paper`."""
     p = Parser("paper", "The paper's tables and figures. What is missing is run first: for days.")
-    p.add_argument("--jobs", type=at_least(1), default=1, help="runs at a time")
+    p.add_argument("--jobs", type=at_least(1), help="runs at a time (1; --fast all cores)")
     p.add_argument("--episodes", type=at_least(1), default=TEST_EPISODES, help="test episodes")
     p.add_argument("--seeds", type=at_least(1), default=3, help="trainings of LbW on each task")
     p.add_argument("--fast", action="store_true", help="a smoke run through all of it")
@@ -105,7 +106,8 @@ def main(argv: list[str]) -> None:
     """Write the page. Raises InputError for a mistake in the arguments or if a run fails."""
     args = parser().read(argv)
     episodes, seeds = (2, 1) if args.fast else (args.episodes, args.seeds)
-    plan = Plan(args.out, args.jobs, episodes, seeds, args.fast)
+    jobs = args.jobs or (os.cpu_count() or 1 if args.fast else 1)
+    plan = Plan(args.out, jobs, episodes, seeds, args.fast)
     make_folder(plan.out / "figures")
     run_missing(plan.runs, wanted(plan), plan.jobs, plan.episodes, fast=plan.fast)
     print(f"paper: {write(plan)}")
