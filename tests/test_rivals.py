@@ -12,6 +12,9 @@ from lbw_minimal.imitate import Recipe, Run
 from tasks.__main__ import main
 from tasks.commands import job
 from tasks.commands.job import parser
+from tasks.commands.run import TEST_SEED
+from tasks.world import film as film_of
+from tasks.world import load_recordings, record_expert
 
 TINY = Recipe(
     human_frames=0, robot_frames=0, munit_iterations=2, munit_width=4,
@@ -204,3 +207,37 @@ def test_further_videos_join_the_human_domain_of_lbw_and_not_its_demonstration(t
 def test_videos_that_no_one_sees_are_refused(line, tmp_path, capfd):
     assert main(["push", *line.split(), "--out", str(tmp_path / "run")]) == 2
     assert "--videos" in capfd.readouterr().err
+
+
+RIVALS = tasks.WEIGHTS / "rivals"  # what notebook 11 shows
+
+
+@pytest.mark.parametrize(
+    "name, method, load",
+    [("translation", "avid", cyclegan.load), ("classifier", "classifier", classifier.load)],
+)
+def test_shipped_network_of_a_rival_loads_and_its_note_says_which_run_made_it(name, method, load):
+    load(RIVALS / f"{name}.safetensors", "push")
+    note = json.loads((RIVALS / f"{name}.json").read_text())
+    settings = note["settings"]
+    assert (settings["task"], settings["method"], settings["set"]) == ("push", method, [])
+    assert name in note["stages"] and note["machine"]
+    assert note["command"].startswith("python -m tasks push ") and method in note["command"]
+    # Fields that came later are not in an older note: at their defaults they change nothing.
+    recipe = tasks.module("push").RECIPE
+    assert settings["recipe"].items() <= job.fields_of(recipe, method).items()
+
+
+def test_shipped_episodes_fool_the_shipped_classifier():
+    """The agent never pushes the cube, and earns more than the expert, which does."""
+    env = tasks.bare("push", jitter=0.005)
+    model = classifier.load(RIVALS / "classifier.safetensors", "push")
+    episodes = load_recordings(RIVALS / "episodes.npz")
+    assert [e.seed for e in episodes] == list(range(TEST_SEED, TEST_SEED + 10))
+    assert not any(e.success.any() for e in episodes)
+    frames, _, again = film_of(env, episodes[0].seed, episodes[0].actions)
+    np.testing.assert_allclose(again.states, episodes[0].states, atol=1e-4)  # m
+    expert, _, done = record_expert(env, episodes[0].seed)
+    assert done.success[-1]
+    paid = [classifier.logits(model, film[1:]) for film in (frames, expert)]
+    assert paid[0].mean() > 0 > paid[1].mean()

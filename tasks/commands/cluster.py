@@ -18,7 +18,7 @@ from typing import Any
 from lbw_minimal.training import InputError
 
 ROOT = Path(__file__).resolve().parents[2]
-SHIPPED = ("lbw_minimal", "notebooks", "solutions", "tasks", "tests")  # of the kit: 20 MB
+SHIPPED = ("lbw_minimal", "notebooks", "solutions", "tasks", "tests")  # of the kit: 25 MB
 RETRIES = 3  # new starts of a job whose worker or node was lost
 # Python that dies with its parent (prctl 1, PR_SET_PDEATHSIG): nobody would end it on a lost node.
 MORTAL = (

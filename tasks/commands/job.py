@@ -204,7 +204,7 @@ def refuse_idle_options(args: argparse.Namespace, from_scratch: bool) -> None:
             why = "the classifier reward trains all of its networks anew"
             idle += [("--weights", args.weights if args.method == "classifier" else None, why)]
         elif args.weights is None:
-            raise InputError("--evaluate: the kit has no rivals' weights; name a run by --weights.")
+            raise InputError("--evaluate: the kit has no rival's policy; name a run by --weights.")
     elif args.reward == "literal":
         idle += [("--without", args.without, "the literal reward has no mends")]
     if from_scratch:

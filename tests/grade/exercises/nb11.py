@@ -39,8 +39,8 @@ def cyclegan_loss(x, y, to_y, to_x, D_x, D_y, lam):
 
 def _domains(rng, ask, more=0):
     """Images of both domains, `more` further ones of y, and generators' weights near 1."""
-    n, h, w = (int(v) for v in rng.integers(2, 6, 3))
-    x, y = _normal(rng, n, 3, h, w), _normal(rng, n + more, 3, h, w) + 0.5
+    n, *shape = (int(v) for v in rng.integers(1, 6, 4))
+    x, y = _normal(rng, n, *shape), _normal(rng, n + more, *shape) + 0.5
     return 1 + _normal(rng, 4, scale=0.3), x, y, float(rng.uniform(0.3, 12)), ask
 
 
@@ -175,7 +175,7 @@ def _room(rng):
 
 
 def _full(rng, **more):
-    size = int(rng.integers(2, 6))
+    size = int(rng.integers(1, 6))
     return _pool(rng, size, size, int(rng.integers(4, 9)), **more)
 
 
@@ -197,6 +197,14 @@ swap.mistake(
     "would change it: detach them first.",
     "made.detach()",
     "made",
+)
+swap.mistake(
+    "What is shown is free of the generator, but the images in the pool are still tied to it: "
+    "detach them before they go in.",
+    "made.detach()",
+    "made",
+    "torch.stack(shown), pool",
+    "torch.stack(shown).detach(), pool",
 )
 swap.mistake(
     "The older image leaves the pool, and the new one takes its place; yours keeps the older one.",
