@@ -239,12 +239,10 @@ def learn(
     batch: int,
     hold: int = 1,
 ) -> list[dict]:
-    """The loop of `train`, for any agent that is a `SAC` and any buffer with its methods.
-
-    hold: steps for which a random action is kept. Returns the log.
+    """The loop of `train`, for any agent that is a `SAC` and any buffer with its methods. Returns the
+    log. hold: steps for which a random action is kept.
     """
-    checkpoint = checkpoint or Checkpoint(None)
-    stateful = {"sac": sac, "buffer": buffer, "rng": rng}
+    checkpoint, stateful = checkpoint or Checkpoint(None), dict(sac=sac, buffer=buffer, rng=rng)
     now, state = checkpoint.resume(stateful, step=0, log=[], candidates=[])
     bar = progress(steps, "policy", now.step)
     while now.step < steps:
