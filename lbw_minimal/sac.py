@@ -239,9 +239,9 @@ def learn(
     batch: int,
     hold: int = 1,
 ) -> list[dict]:
-    """The loop of `train`, for any agent that is a `SAC` and any buffer with its methods. Returns the
-    log. hold: steps for which a random action is kept.
-    """
+    """The loop of `train`, for any agent that is a `SAC` and any buffer with its methods.
+
+    hold: steps for which a random action is kept. Returns the log."""
     checkpoint, stateful = checkpoint or Checkpoint(None), dict(sac=sac, buffer=buffer, rng=rng)
     now, state = checkpoint.resume(stateful, step=0, log=[], candidates=[])
     bar = progress(steps, "policy", now.step)
