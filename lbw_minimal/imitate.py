@@ -46,12 +46,12 @@ class Recipe:
     updates: int = 2  # of SAC's networks, an environment step
     entropy: float = -1.0  # SAC's target at first, per number of an action; it falls to -3.5
     # The rivals' alone, see `rivals.py`.
-    motion: int = 0  # 1: CycleGAN with MUNIT's motion weights
+    motion: bool = False  # CycleGAN with MUNIT's motion weights
     classifier_iterations: int = 10_000
-    random_negatives: int = 0  # 1: random motion is among the classifier's negatives
+    random_negatives: bool = True  # random motion is among the classifier's negatives
     clip: float = 10.0  # the classifier's logit that earns a reward of 1, and the most that counts
     pixel_updates: int = 1  # of SAC+AE's networks, an environment step
-    hold: int = 1  # steps for which each random action is kept, before SAC+AE has learnt any
+    hold: int = 10  # steps for which each random action is kept, before SAC+AE has learnt any
 
 
 @dataclass

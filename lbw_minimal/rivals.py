@@ -94,7 +94,7 @@ def learn_translation(
         with run.stage("translation") as checkpoint:
             G, log = cyclegan.train(
                 np.concatenate([demo, random]), robot, iterations=recipe.munit_iterations,
-                width=recipe.munit_width, motion=bool(recipe.motion), seed=seed, device=device,
+                width=recipe.munit_width, motion=recipe.motion, seed=seed, device=device,
                 checkpoint=checkpoint,
             )  # fmt: skip
             run.log("translation_log", log)

@@ -66,7 +66,8 @@ def test_avids_classifier_is_shown_translated_videos_of_all_experts(tmp_path, mo
     monkeypatch.setattr(cyclegan, "translate", lambda model, frames: 255 - frames)
     real = classifier.goal_frames
     monkeypatch.setattr(classifier, "goal_frames", lambda v: shown.append(v) or real(v))
-    train = cyclegan.train
+    train, judge, judged = cyclegan.train, classifier.train, []
+    monkeypatch.setattr(classifier, "train", lambda *a, **k: judged.append(a) or judge(*a, **k))
 
     def watch(human, robot, **more):
         learnt.append((human, robot, more["iterations"]))
@@ -82,6 +83,8 @@ def test_avids_classifier_is_shown_translated_videos_of_all_experts(tmp_path, mo
     assert iterations == TINY.munit_iterations
     for video, expert in zip(shown[0], experts, strict=True):
         np.testing.assert_array_equal(video, 255 - expert)
+    ((_, negative),) = judged  # random motion too is seen through the translation
+    np.testing.assert_array_equal(negative[-6:], 255 - random)
 
 
 @pytest.mark.parametrize(("longest", "steps"), [(20, 25), (500, tasks.module("reach").HORIZON)])
@@ -108,7 +111,7 @@ def test_the_clip_of_the_recipe_bounds_the_reward():
 def test_a_rivals_run_ends_with_a_page_and_is_replayed(method, tmp_path, capfd, monkeypatch):
     monkeypatch.setattr(tasks, "ROBOT_EXPERTS", 2)
     monkeypatch.setattr(job, "EXPERTS", 2)
-    fields = {"classifier_iterations": 5, "policy_steps": 40}
+    fields = {"classifier_iterations": 5, "policy_steps": 40, "random_negatives": 0}
     if method == "avid":
         fields |= {"munit_iterations": 2, "robot_frames": 40}
     more = [word for k, v in fields.items() for word in ("--set", f"{k}={v}")]
@@ -179,6 +182,14 @@ def test_what_only_rivals_take_is_refused_for_lbw(capfd):
 def count_videos(*line):
     args = parser("push").read(list(line))
     return len(job.videos("push", args))
+
+
+def test_a_switch_of_the_recipe_is_on_or_off(tmp_path, capfd):
+    line = ["--method", "classifier", "--set", "random_negatives=0", "--out", str(tmp_path)]
+    asked = job.check("push", parser("push").read(line), line)
+    assert asked.recipe.random_negatives is False and tasks.push.RECIPE.random_negatives is True
+    assert main(["push", "--method", "avid", "--set", "motion=2"]) == 2
+    assert "--set motion=2: '2' is neither 0 nor 1" in capfd.readouterr().err
 
 
 def test_each_method_learns_from_as_many_videos_as_in_the_paper_or_as_asked():

@@ -244,20 +244,24 @@ def read_settings(args: argparse.Namespace, from_scratch: bool) -> dict[str, Any
             )
         if name in fixed:
             raise InputError(f"--set {text}: {why}.")
-        out[name] = read_number(text, value, whole=fields[name].type == "int")
+        out[name] = read_number(text, value, str(fields[name].type))
     return out
 
 
-def read_number(text: str, value: str, whole: bool) -> float:
-    """The value of a setting: a whole number of 1 or more, or else any finite number."""
+def read_number(text: str, value: str, kind: str) -> float:
+    """The value of a setting whose type is called `kind`, as a number."""
+    read, allowed, what = {
+        "bool": (int, lambda number: number in (0, 1), "neither 0 nor 1"),
+        "int": (int, lambda number: number >= 1, "no whole number of 1 or more"),
+        "float": (float, math.isfinite, "no finite number"),
+    }[kind]
     try:
-        number = int(value) if whole else float(value)
+        number = read(value)
     except ValueError:
         number = math.nan
-    if not math.isfinite(number) or (whole and number < 1):
-        kind = "whole number of 1 or more" if whole else "finite number"
-        raise InputError(f"--set {text}: {value!r} is no {kind}.")
-    return number
+    if not allowed(number):
+        raise InputError(f"--set {text}: {value!r} is {what}.")
+    return bool(number) if kind == "bool" else number
 
 
 def prepare_folder(out: Path, settings: dict[str, Any], resume: bool) -> Path:
