@@ -1,6 +1,7 @@
 """The rivals as whole methods: what each stage is given, what it leaves, and how a run goes on."""
 
 import json
+import re
 
 import gymnasium as gym
 import numpy as np
@@ -249,3 +250,22 @@ def test_shipped_episodes_fool_the_shipped_classifier():
     assert done.success[-1]
     paid = [classifier.logits(model, film[1:]) for film in (frames, expert)]
     assert paid[0].mean() > 0 > paid[1].mean()
+
+
+TRIED = tasks.ROOT / "solutions" / "results" / "rivals"
+CELL = r"([^|]+) \| "
+ROW = rf"\| \[(\w+)\]\(rivals/(\S+)\.json\) \| {CELL}{CELL}{CELL}{CELL}{CELL}(\d+)/(\d+) \|"
+
+
+def test_the_table_of_what_was_tried_is_that_of_the_runs():
+    rows = re.findall(ROW, (TRIED.parent / "README.md").read_text())
+    assert {row[1] for row in rows} == {path.stem for path in TRIED.glob("*.json")}
+    for task, name, method, negatives, _, hold, updates, wins, episodes in rows:
+        note = json.loads((TRIED / f"{name}.json").read_text())
+        settings, recipe = note["settings"], note["settings"]["recipe"]
+        assert (settings["task"], settings["seed"]) == (task, 0)
+        assert settings["method"] == {"AVID-m": "avid"}.get(method, method)
+        assert bool(recipe.get("random_negatives")) == ("random" in negatives)
+        assert (recipe.get("hold", 1), recipe["pixel_updates"]) == (int(hold), int(updates))
+        done = [episode["success"] for episode in note["episodes"]]
+        assert (sum(done), len(done)) == (int(wins), int(episodes))
