@@ -128,3 +128,11 @@ def test_the_shipped_policy_reaches_and_idle_does_not(tmp_path, capsys, monkeypa
     assert len(found) == 9
     shown = capsys.readouterr().out
     assert "| reach | 5 mm |" in shown and "| the policy | 2/2 (34-100 %) |" in shown
+
+
+def test_the_tables_in_the_results_are_those_of_the_measurements():
+    results = tasks.ROOT / "solutions" / "results"
+    notes = [json.loads(path.read_text()) for path in (results / "controls").glob("*.json")]
+    assert notes and all(note["episodes"] == 100 for note in notes)
+    text = (results / "README.md").read_text()
+    assert all(controls.table(note) in text for note in notes)

@@ -29,14 +29,14 @@ from tasks.commands.record import EXPERTS
 TEST_EPISODES = 10  # as in the paper
 RESULTS = ("*.checkpoint", "*.frames", "*.safetensors", "*_log.json", "metrics.json", "report.html")
 FAST = {
-    "munit_iterations": 20,
+    "munit_iterations": 10,
     "munit_width": 8,
-    "transporter_iterations": 30,
-    "policy_steps": 1000,
+    "transporter_iterations": 20,
+    "policy_steps": 800,
     "robot_frames": 200,
     "classifier_iterations": 200,
 }
-FAST_PIXELS = {"policy_steps": 600}  # a hundred updates, each of which takes ten of LbW's
+FAST_PIXELS = {"policy_steps": 530}  # few updates, each of which takes ten of LbW's
 TRANSLATION = ("robot_frames", "munit_iterations", "munit_width")
 PERCEPTION = (*TRANSLATION, "transporter_iterations", "K", "shift", "hue")
 # Fields that only the rivals have.
