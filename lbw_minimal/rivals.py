@@ -14,6 +14,8 @@ Every stage leaves its result in the run's folder, as in `imitate.py`.
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import gymnasium as gym
 import numpy as np
 from gymnasium.wrappers import FrameStackObservation, TimeLimit
@@ -138,6 +140,15 @@ def watched(env: gym.Env, model: GoalClassifier, clip: float = classifier.CLIP) 
     episode = round(model.longest.item() / MOST_OF_HORIZON)
     env = ClassifierRewardWrapper(env, ClassifierReward(model, clip))
     return TimeLimit(FrameStackObservation(env, STACK), min(horizon or episode, episode))
+
+
+def replayed(env: gym.Env, folder: Path, task: str) -> tuple[Policy, gym.Env]:
+    """A rival's policy from the folder of its run, and `env` as it sees it.
+
+    Raises InputError if a file is missing, damaged, or another task's.
+    """
+    model = classifier.load(folder / "classifier.safetensors", task)
+    return sac_ae.load(folder / "policy.safetensors"), watched(env, model)
 
 
 def learn_from_pixels(

@@ -21,7 +21,7 @@ import numpy as np
 import torch
 
 from lbw_minimal.replay import Batch, ReplayBuffer
-from lbw_minimal.sac_networks import Actor, Normaliser, Policy, TwinCritic
+from lbw_minimal.sac_networks import Actor, Normaliser, Policy, TwinCritic, length
 from lbw_minimal.training import (
     Checkpoint,
     InputError,
@@ -241,8 +241,10 @@ def learn(
 ) -> list[dict]:
     """The loop of `train`, for any agent that is a `SAC` and any buffer with its methods.
 
-    hold: steps for which a random action is kept. Returns the log."""
-    checkpoint, stateful = checkpoint or Checkpoint(None), dict(sac=sac, buffer=buffer, rng=rng)
+    hold: steps for which a random action is kept. Returns the log.
+    """
+    checkpoint = checkpoint or Checkpoint(None)
+    stateful = {"sac": sac, "buffer": buffer, "rng": rng}
     now, state = checkpoint.resume(stateful, step=0, log=[], candidates=[])
     bar = progress(steps, "policy", now.step)
     while now.step < steps:
@@ -278,12 +280,6 @@ def learn(
     actors = [c["actor"] for c in now.candidates] + [deepcopy(sac.test_actor.state_dict())]
     sac.test_actor.load_state_dict(best_actor(env, sac, actors, seed))
     return now.log
-
-
-def length(space: gym.Space) -> int:
-    """Of the vectors in a Box."""
-    assert isinstance(space, gym.spaces.Box)
-    return space.shape[0]
 
 
 def _uniform(rng, env):

@@ -21,7 +21,7 @@ import numpy as np
 import torch
 
 from lbw_minimal.replay import STACK, Batch, FrameBuffer
-from lbw_minimal.sac import SAC, learn, length
+from lbw_minimal.sac import SAC, learn
 from lbw_minimal.sac_ae_networks import (
     FRAME,
     SIZES,
@@ -31,7 +31,7 @@ from lbw_minimal.sac_ae_networks import (
     PixelActor,
     PixelCritic,
 )
-from lbw_minimal.sac_networks import Policy, draw
+from lbw_minimal.sac_networks import Policy, draw, length
 from lbw_minimal.training import Checkpoint, InputError, load_state, save_state, seed_everything
 
 # The publication's: of the latents' mean square length, and of the decoder's weights.

@@ -11,6 +11,7 @@ import math
 from itertools import pairwise
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 import torch
 import torch.nn.functional as F
@@ -20,6 +21,12 @@ from torch import nn
 MIN_OBS_STD = 0.02
 # exp(-5) is as good as deterministic; exp(2) is past tanh's ends.
 LOG_STD_MIN, LOG_STD_MAX = -5.0, 2.0
+
+
+def length(space: gym.Space) -> int:
+    """Of the vectors in a Box."""
+    assert isinstance(space, gym.spaces.Box)
+    return space.shape[0]
 
 
 class Normaliser(nn.Module):

@@ -56,6 +56,11 @@ def finished(path: Path, episodes: int) -> bool:
     return note.exists() and len(json.loads(note.read_text()).get("episodes", ())) == episodes
 
 
+def rests_on(change: str) -> str:
+    """The change whose run has to be there first: its own if it stands alone."""
+    return change if change in ALONE else LATER[change][0]
+
+
 def command(
     out: Path, task: str, seed: int, change: str, episodes: int, fast: bool = False
 ) -> list[str]:
@@ -66,8 +71,7 @@ def command(
     if change in ALONE:
         args += ALONE[change]
     else:
-        first, more = LATER[change]
-        args += ["--weights", str(folder(out, task, seed, first)), *more]
+        args += ["--weights", str(folder(out, task, seed, rests_on(change))), *LATER[change][1]]
     args += ["--fast"] * fast
     return args + ["--resume"] * (path / "settings.json").exists()
 
@@ -79,10 +83,7 @@ def memory(change: str) -> int:
 
 def missing(out: Path, wanted: list[Job], episodes: int) -> tuple[list[Job], list[Job]]:
     """The runs that are not finished: those that stand alone, then those that need one of them."""
-    alone = [
-        (task, seed, change if change in ALONE else LATER[change][0])
-        for task, seed, change in wanted
-    ]
+    alone = [(task, seed, rests_on(change)) for task, seed, change in wanted]
     both = list(dict.fromkeys(alone)), [job for job in wanted if job[2] not in ALONE]
     first, then = ([j for j in some if not finished(folder(out, *j), episodes)] for some in both)
     return first, then
@@ -142,11 +143,10 @@ def run_on_cluster(out: Path, jobs: list[Job], episodes: int) -> None:
     """
 
     def packed(job):
-        later = job[2] in LATER
-        path, base = folder(out, *job), folder(out, *job[:2], LATER[job[2]][0] if later else "")
+        path, base = folder(out, *job), folder(out, *job[:2], rests_on(job[2]))
         there = {str(p): f"runs/{p.name}" for p in (path, base)}
         line = [*RUN, *(there.get(word, word) for word in command(out, *job, episodes))]
-        files = {there[str(base)]: cluster.pack(base, "*.safetensors")} if later else {}
+        files = {there[str(base)]: cluster.pack(base, "*.safetensors")} if base != path else {}
         return line, files | {there[str(path)]: cluster.pack(path)}, there[str(path)]
 
     failed = []

@@ -19,7 +19,7 @@ import torch
 from gymnasium.wrappers import TimeLimit
 
 import tasks
-from lbw_minimal import classifier, rivals, sac, sac_ae
+from lbw_minimal import rivals, sac
 from lbw_minimal.imitate import watched
 from lbw_minimal.report import wilson
 from lbw_minimal.training import InputError, write_atomic
@@ -122,9 +122,7 @@ def best(env: gym.Env, robots: list[Robot], trials: int) -> Robot:
 
 def rival_wins(task: str, run: Path, jitter: float, episodes: int) -> int:
     """Successful episodes of a rival's policy; run: the folder of its run."""
-    model = classifier.load(run / "classifier.safetensors", task)
-    policy = sac_ae.load(run / "policy.safetensors")
-    env = rivals.watched(gym.make(tasks.id_of(task), jitter=jitter), model)
+    policy, env = rivals.replayed(gym.make(tasks.id_of(task), jitter=jitter), run, task)
     count = wins(env, lambda obs, t: policy.act(obs, deterministic=True), episodes)
     env.close()
     return count

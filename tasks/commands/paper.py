@@ -246,15 +246,8 @@ def needs_eyes(plan: Plan, change: str) -> str:
 
 def trained_wide(runs: dict[tuple[str, str], list]) -> str:
     """LbW with starts moved by 2 cm in training and test."""
-    rows = [
-        [
-            task,
-            percent(runs[task, "wide"]),
-            each(runs[task, "wide"]),
-            f"{runs[task, 'wide'][0]['steps']:,}",
-        ]
-        for task in tasks.TASKS
-    ]
+    some = {task: runs[task, "wide"] for task in tasks.TASKS}
+    rows = [[t, percent(r), each(r), f"{r[0]['steps']:,}"] for t, r in some.items()]
     return markdown(["task", "success (95 % interval)", "by seed", "environment steps"], rows)
 
 

@@ -97,13 +97,16 @@ def rival(job: Job) -> tuple[sac.Policy, gym.Env, dict[str, Any]]:
         films = tasks.robot_experts(job.name, job.args.jitter)
         shown = [frames for frames, _ in islice(films, 1 if job.args.evaluate else None)]
         run.metrics["stages"]["robot_experts"] = round(time.monotonic() - start, 1)
-        more = recipe.random_negatives and not job.args.evaluate
-        random = film_robot(job, recipe.robot_frames) if more else shown[0][:0]
-        agent, env = rivals.classifier_reward(env, shown, random, recipe, **common)
         seen: dict[str, Any] = {"demo": shown[0]}
-    else:
-        robot = film_robot(job, recipe.robot_frames)
+    if job.args.evaluate:
+        agent, env = rivals.replayed(env, run.out, job.name)
+    elif avid:  # a translation that is there needs no frames of the robot
+        robot = job.demo[:0] if job.args.weights else film_robot(job, recipe.robot_frames)
         agent, env = rivals.avid_m(env, job.experts, job.random, robot, recipe, **common)
+    else:
+        random = film_robot(job, recipe.robot_frames) if recipe.random_negatives else shown[0][:0]
+        agent, env = rivals.classifier_reward(env, shown, random, recipe, **common)
+    if avid:
         G = cyclegan.load(run.out / "translation.safetensors", job.name)
         seen = {"demo": job.demo, "translated": cyclegan.translate(G, job.demo)}
     model = classifier.load(run.out / "classifier.safetensors", job.name)

@@ -96,6 +96,11 @@ def each(rows: list[Row]) -> str:
     return ", ".join(f"{r['wins']}/{r['episodes']}" for r in rows)
 
 
+def hours(rows: list[Row]) -> str:
+    """Time of all stages of some runs together."""
+    return f"{sum(sum(r['stages'].values()) for r in rows) / 3600:.1f} h"
+
+
 def markdown(head: list[str], rows: list[list[str]]) -> str:
     """A table in Markdown."""
     lines = [head, ["---"] * len(head), *rows]
@@ -164,8 +169,7 @@ def table_two(runs: dict[tuple[str, str], list[Row]]) -> str:
             for t in tasks.TASKS
         ]
         done = [r for (_, c), some in runs.items() if c == change for r in some]
-        hours = sum(sum(r["stages"].values()) for r in done) / 3600
-        rows.append([name, videos, *cells, f"{hours:.1f} h in {len(done)} runs"])
+        rows.append([name, videos, *cells, f"{hours(done)} in {len(done)} runs"])
     return markdown(["method", "expert videos", *tasks.TASKS, "time"], rows)
 
 
@@ -175,8 +179,7 @@ def every_run(runs: dict[tuple[str, str], list[Row]]) -> str:
     for change, (name, _) in METHODS.items():
         for task in tasks.TASKS:
             some = runs[task, change]
-            hours = sum(sum(r["stages"].values()) for r in some) / 3600
-            rows.append([name, task, each(some), f"{some[0]['steps']:,}", f"{hours:.1f} h"])
+            rows.append([name, task, each(some), f"{some[0]['steps']:,}", hours(some)])
     return markdown(["method", "task", "by seed", "environment steps", "time"], rows)
 
 

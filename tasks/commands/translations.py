@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 
 import tasks
 from lbw_minimal import cyclegan, transporter, video
-from lbw_minimal.imitate import Perception, load_perception
+from lbw_minimal.imitate import Perception
 from lbw_minimal.pictures import draw_keypoints, enlarge
 from tasks.commands import figures
 from tasks.commands.batch import folder
@@ -29,9 +29,7 @@ def demo_of(task: str) -> np.ndarray:
 @cache
 def munit(runs: Path) -> Perception:
     """What LbW's first run on push perceives, which has watched the demonstration."""
-    perception = load_perception(folder(runs, "push", 0), "push")
-    perception.watch(demo_of("push"))
-    return perception
+    return tasks.trained_perception("push", folder(runs, "push", 0))
 
 
 @dataclass
