@@ -73,3 +73,43 @@ def test_reset_puts_the_tip_where_it_was_told(env):
     for goal in ((0.45, 0, 0.05), (0.70, 0.01, 0.15)):
         env.arm.reset(np.array(goal))
         np.testing.assert_allclose(env.arm.tip_pose()[0], goal, atol=1e-5)
+
+
+def test_no_torque_is_above_the_joints_limit_and_all_are_cut_by_one_factor(env):
+    """A goal far away asks for more than a joint has; what gravity takes is not cut."""
+    arm, sent = env.arm, []
+    send = arm.p.setJointMotorControlArray
+    arm.p.setJointMotorControlArray = lambda *args, **more: (
+        sent.append(np.array(more["forces"])) or send(*args, **more)
+    )
+    arm.speed = np.full(7, np.inf)  # or the speed limit would make the goal come nearer
+    arm.goal = arm.tip_pose()[0] + (0.1, 0, 0.3)
+    arm.prepare()
+    arm.kp_before = arm._bias.copy()
+    q, dq = arm.state()
+    asked = arm._bias - arm._Kq @ q - arm._Kd @ dq
+    arm.effort = np.abs(arm._h) + 0.5 * np.abs(asked - arm._h).max() * np.linspace(0.2, 1, 7)
+    arm.actuate()
+    del arm.p.setJointMotorControlArray
+    assert (np.abs(asked) > arm.effort).any()
+    assert (np.abs(sent[-1]) <= arm.effort + 1e-9).all()
+    assert np.isclose(np.abs(sent[-1]), arm.effort).any()
+    share = (sent[-1] - arm._h) / (asked - arm._h)
+    np.testing.assert_allclose(share, share[0])
+    assert 0 < share[0] < 1
+
+
+def test_a_twisted_arm_comes_back_to_its_posture_while_its_tip_stays(env):
+    """In the nullspace of the tip: a seventh of a radian is a fifth of it after a second."""
+    arm = env.arm
+    q, _ = arm.state()
+    J = arm.jacobian(q)
+    free = np.linalg.svd(J)[2][-1]  # moves no tip, to first order
+    arm._set(q + 0.15 * free)
+    tip = arm.tip_pose()[0]
+    arm.goal = tip.copy()
+    before = np.abs(free @ (arm.state()[0] - q))
+    for _ in range(25):
+        env.step(np.zeros(3))
+    after, moved = np.abs(free @ (arm.state()[0] - q)), arm.tip_pose()[0] - tip
+    assert after < 0.4 * before and np.abs(moved).max() < 0.004

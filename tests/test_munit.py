@@ -219,3 +219,138 @@ def test_short_training_halves_reconstruction_and_cycle_loss(videos, monkeypatch
     _, log = munit.train(*videos, iterations=40, seed=0, width=4, batch=1)
     for name in ("L_rec^x", "L_rec^y", "L_cyc^x", "L_cyc^y"):
         assert log[-1][name] < 0.5 * log[0][name]
+
+
+def noise(n, seed=0):
+    """Images (n, 3, 84, 84) of no domain."""
+    return torch.rand(n, 3, 84, 84, generator=torch.Generator().manual_seed(seed)) * 2 - 1
+
+
+def test_an_update_descends_the_generators_loss_and_then_the_critics_on_the_same_translations():
+    """Against plain lines, by gradient descent of rate 1 and with two different medians."""
+    torch.manual_seed(0)
+    model, critics = MUNIT(2), nn.ModuleDict({d: munit.Critic(2) for d in "xy"})
+    x, y, medians = noise(2, 1), noise(2, 2), (0.5 * noise(1, 3), -0.9 * noise(1, 4).abs())
+    swapped = swap(model, x, y)
+    loss = munit.total_loss(generator_losses(model, critics, x, y, swapped, *medians))
+    of_model = torch.autograd.grad(loss, list(model.parameters()), allow_unused=True)
+    loss = sum(discriminator_losses(critics, x, y, swapped, *medians).values())
+    of_critics = torch.autograd.grad(loss, list(critics.parameters()))
+    expected = [
+        p.detach() - (0 if grad is None else grad)
+        for network, grads in ((model, of_model), (critics, of_critics))
+        for p, grad in zip(network.parameters(), grads, strict=True)
+    ]
+    rate_1 = [torch.optim.SGD(network.parameters(), 1.0) for network in (model, critics)]
+    told = munit._update(model, critics, *rate_1, x, y, medians)
+    moved = [*model.parameters(), *critics.parameters()]
+    for p, wanted in zip(moved, expected, strict=True):
+        torch.testing.assert_close(p, wanted)
+    assert len(told) == 12 and told["L_D^x"] + told["L_D^y"] == pytest.approx(loss.item())
+
+
+def test_training_takes_x_from_the_human_and_y_from_the_robot_and_returns_the_averaged_weights(
+    monkeypatch,
+):
+    human, robot = (np.full((4, 84, 84, 3), level, np.uint8) for level in (0, 255))
+    seen, rates = [], []
+
+    def update(model, critics, adam_G, adam_D, x, y, medians):
+        rates.append([adam.param_groups[0]["lr"] for adam in (adam_G, adam_D)])
+        seen.append([v.mean().item() for v in (x, y, *medians)])
+        assert x.shape == y.shape == (3, 3, 84, 84)
+        assert {id(p) for p in adam_G.param_groups[0]["params"]} == set(map(id, model.parameters()))
+        assert {id(p) for p in adam_D.param_groups[0]["params"]} == set(
+            map(id, critics.parameters())
+        )
+        with torch.no_grad():
+            for p in model.parameters():
+                p.fill_(11.0)
+        return {}
+
+    def follow(average, model, step):
+        for p in average.parameters():
+            p.data.fill_(step)
+
+    monkeypatch.setattr(munit, "_update", update)
+    monkeypatch.setattr(munit.gan, "follow", follow)
+    average, _ = munit.train(human, robot, iterations=4, seed=0, width=2, batch=3)
+    assert seen == 4 * [[-1, 1, -1, 1]]
+    full, falling = [4e-4, 1.2e-3], [2e-4, 6e-4]
+    assert rates == [pytest.approx(v) for v in (full, full, full, falling)]
+    assert all((p == 4).all() for p in average.parameters()) and not average.training
+
+
+class Tints:
+    """A model whose style is an image's mean grey per domain, and whose images are their style."""
+
+    def __init__(self):
+        self.weight = nn.Parameter(torch.zeros(1))
+
+    def parameters(self):
+        yield self.weight
+
+    def content(self, image, domain):
+        return image if domain == "x" else -image
+
+    def style(self, image, domain):
+        return image.mean((1, 2, 3), keepdim=True).flatten(1) + (0.1 if domain == "y" else 0.0)
+
+    def decode(self, c, s, domain):
+        return 0.5 * c + s[:, :, None, None] * (1.0 if domain == "x" else 2.0)
+
+
+def test_a_translation_has_the_videos_content_and_the_other_domains_style():
+    """Human grey 25.5 is -0.8, robot 153 is 0.2; styles -0.8 in x and 0.2 + 0.1 in y."""
+    human, robot = (np.full((2, 84, 84, 3), level, np.uint8) for level in (25, 153))
+    h, r = 25 / 127.5 - 1, 153 / 127.5 - 1
+    model = Tints()
+    s_y = munit.robot_style(model, robot)
+    assert s_y.item() == pytest.approx(r + 0.1)
+    grey = lambda v: round((v + 1) * 127.5)  # noqa: E731
+    assert (munit.translate(model, human, s_y) == grey(0.5 * h + 2 * (r + 0.1))).all()
+    mean = munit.mean_images(model, human, robot)
+    expected = {
+        "x": 25,
+        "y": 153,
+        "x_of_y": grey(-0.5 * r + h),
+        "y_of_x": grey(0.5 * h + 2 * r + 0.2),
+    }
+    for name, value in expected.items():
+        assert (mean[name] == value).all(), name
+
+
+def test_the_style_reaches_every_block_as_means_and_deviations_of_adain():
+    """With an mlp that says 0 a block normalises; what it says adds to mean 0 and deviation 1."""
+    torch.manual_seed(0)
+    decoder, c = MUNIT(2, blocks=2).G["y"], torch.randn(1, 8, 21, 21)
+    for p in decoder.mlp.parameters():
+        nn.init.zeros_(p)
+
+    def by_hand(said):
+        h = c
+        for block, (m1, s1, m2, s2) in zip(decoder.blocks, said.reshape(2, 4, 8), strict=True):
+            inner = adain(block.first(h), m1[None], 1 + s1[None]).relu()
+            h = h + adain(block.second(inner), m2[None], 1 + s2[None])
+        return torch.tanh(decoder.out(decoder.up(h).relu()))
+
+    for said in (torch.zeros(64), torch.linspace(-0.5, 0.9, 64)):
+        decoder.mlp[-1].bias.data = said
+        torch.testing.assert_close(decoder(c, torch.ones(1, 8)), by_hand(said))
+
+
+def test_codes_images_and_scores_have_the_sizes_that_the_docstrings_say():
+    model, critic, v = MUNIT(3, style_dim=5), munit.Critic(4), noise(2)
+    assert model.content(v, "x").shape == (2, 12, 21, 21) and model.style(v, "y").shape == (2, 5)
+    assert model.decode(model.content(v, "x"), model.style(v, "y"), "y").shape == v.shape
+    assert [score.shape for score in critic(v)] == [(2, 1, 10, 10), (2, 1, 5, 5)]
+
+
+def test_a_critics_scores_look_at_patches_of_22_and_44_pixels():
+    critic, v = munit.Critic(2), noise(1).requires_grad_()
+    for scale, size in ((0, 22), (1, 44)):
+        score = critic(v)[scale]
+        h = score.shape[-1] // 2
+        (seen,) = torch.autograd.grad(score[0, 0, h, h], v)
+        rows = seen.abs().sum((0, 1, 3)).nonzero()
+        assert rows.max() - rows.min() + 1 == size

@@ -11,6 +11,7 @@ from lbw_minimal.reward import (
     MENDS,
     LiteralReward,
     MendedReward,
+    prepare,
     resample,
     trim_pauses,
 )
@@ -180,6 +181,76 @@ def test_without_the_goal_frame_the_frame_before_it_is_the_target(toy):
 def test_every_mend_can_be_switched_off_alone(toy, mend):
     z = replay(toy)
     assert total(mended(toy, **{mend: False}), z) != pytest.approx(total(mended(toy), z), abs=1e-6)
+
+
+def test_the_mended_reward_by_hand():
+    """Frame and step of the same time, the mean over keypoints, in units of the mean path.
+
+    Two keypoints go 1 and 3 to the right, so the path is 2. The robot's pace is that of the
+    demonstration, so that nothing is stretched.
+    """
+    t = np.linspace(0, 1, 5)
+    z_E = np.zeros((5, 2, 2))
+    z_E[:, 0, 0], z_E[:, 1, 0] = t, 3 * t
+    reward = MendedReward(z_E, z_E)
+    np.testing.assert_allclose(reward.z_E, z_E)
+    z, z_next = z_E[1] + (0.1, 0), z_E[2] + (0, 0.2)
+    r, parts = reward(z, z_next, 1)
+    assert parts["r1"] == pytest.approx(-0.2 / 2)
+    assert parts["r2"] == pytest.approx(-np.hypot(0.1, 0.2) / 2)
+    assert r == pytest.approx(parts["r1"] + 3 * parts["r2"])
+    stay, parts = reward(z_E[4], z_E[4] + (0, 0.4), 9)  # after the end: the goal, at rest
+    assert parts == {"r1": pytest.approx(-0.2), "r2": pytest.approx(-0.2)}
+    assert stay == pytest.approx(-0.8)
+
+
+def test_an_untimed_mended_reward_takes_the_nearest_frame_and_the_nearest_step():
+    z_E = line(0, 1, 3, 6)
+    reward = MendedReward(z_E, 10 * random_walk(1), timed=False, trim=False, speed=False)
+    _, parts = reward(line(0)[0], line(2.9)[0], 0)
+    far = reward.path
+    assert parts == {"r1": pytest.approx(-0.1 / far), "r2": pytest.approx(-0.1 / far)}
+    assert reward(line(5)[0], line(6)[0])[1]["r1"] == 0
+    without = MendedReward(
+        z_E, 10 * random_walk(1), timed=False, trim=False, speed=False, include_goal=False
+    )
+    assert without(line(5)[0], line(6)[0])[1]["r1"] == pytest.approx(-min(3, 2 * far) / far)
+
+
+def test_an_episode_gives_the_demonstration_eighty_percent():
+    assert LiteralReward(np.zeros((40, 1, 2))).episode == 50
+    z = line(*np.linspace(0, 1, 40))
+    assert MendedReward(z, z).episode == 50 and MendedReward(z, z, horizon=30).episode == 30
+
+
+def test_what_moves_less_than_a_tenth_of_the_robots_median_step_is_at_rest():
+    """The robot's median step is 1: a crawl of 0.019 a frame is at rest, and a rest keeps five.
+
+    0.019 times five is just below a tenth, so that in each group of frames only the rest stays.
+    """
+    robot = line(*np.arange(50.0))
+    walk = [0, 1, 2, 3]
+    crawl = [3 + 0.004 * i for i in range(1, 21)]
+    z = prepare(line(*walk, *crawl, 4, 5), robot, speed=False)
+    assert z[:, 0, 0].tolist() == pytest.approx([*walk, *crawl[:5], 4, 5])
+    faster = [3 + 0.11 * i for i in range(1, 6)]
+    z = prepare(line(*walk, *faster, 4, 5), robot, speed=False)
+    assert len(z) == 11
+
+
+def test_one_glitch_is_gone_before_anything_is_measured():
+    robot = line(*np.arange(50.0))
+    x = np.arange(8.0)
+    x[4] = 100
+    z = prepare(line(*x), robot, trim=False, speed=False)
+    assert z[:, 0, 0].tolist() == [0, 1, 2, 3, 5, 6, 6, 7]  # medians of three
+
+
+def test_the_robots_top_step_is_its_ninth_decile():
+    """Of thirty steps two are 5, the resets of episodes, the others 0.1: that is the pace."""
+    robot = line(*np.cumsum([0.0, *(14 * [0.1]), 5.0, *(14 * [0.1]), 5.0]))
+    z = prepare(line(0, 0.3, 0.6, 0.9), robot, trim=False)
+    assert np.diff(z[:, 0, 0]) == pytest.approx(9 * [0.1])
 
 
 # Its preparation ----------------------------------------------------------------------------------

@@ -240,6 +240,106 @@ def test_the_time_limit_is_not_stored_as_the_end(monkeypatch):
     assert len(buffers[0]) == 60 and (buffers[0].data["terminal"] == 0).all()
 
 
+def test_a_transition_is_kept_as_it_happened(monkeypatch):
+    """s, a, r and s' of a walk whose laws are known; within an episode s' is the next s."""
+    buffers = []
+    monkeypatch.setattr(
+        module, "ReplayBuffer", lambda *a: buffers.append(ReplayBuffer(*a)) or buffers[-1]
+    )
+    train(Walk(), steps=60, seed=0, random_steps=30, width=8, batch=8)
+    obs, action, reward, next_obs, _ = (
+        buffers[0].data[k][:60] for k in ("obs", "action", "reward", "next_obs", "terminal")
+    )
+    np.testing.assert_allclose(next_obs, np.clip(obs + 0.2 * action, -2, 2), atol=1e-6)
+    np.testing.assert_allclose(reward, -np.abs(next_obs[:, 0] - 0.5), atol=1e-6)
+    same = np.arange(59) % 20 != 19
+    np.testing.assert_array_equal(next_obs[:-1][same], obs[1:][same])
+    assert not np.allclose(next_obs[:-1][~same], obs[1:][~same])
+
+
+def test_training_observes_every_state_and_updates_after_the_random_steps(monkeypatch):
+    """Twenty steps an episode; from step 31 on, three updates each, of a batch of eight."""
+    calls = []
+    update = SAC.update
+    monkeypatch.setattr(SAC, "update", lambda sac, b: calls.append(len(b["obs"])) or update(sac, b))
+    sac, log = train(Walk(), steps=50, seed=0, random_steps=30, width=8, batch=8, updates=3)
+    assert [row["step"] for row in log] == [20, 40, 60]
+    assert calls == 3 * 30 * [8]
+    assert int(sac.normalise.count) == 63  # a start and twenty steps, three times
+
+
+def test_the_first_actions_are_uniform_and_the_later_ones_the_actors(monkeypatch):
+    acted = []
+    act = SAC.act
+
+    def told(sac, obs, deterministic=False):
+        acted.append(deterministic)
+        return act(sac, obs, deterministic)
+
+    class Watched(Walk):
+        actions: list = []
+
+        def step(self, action):
+            self.actions.append(float(action[0]))
+            return super().step(action)
+
+    monkeypatch.setattr(SAC, "act", told)
+    monkeypatch.setattr(module, "best_actor", lambda env, sac, actors, seed: actors[0])
+    train(Watched(), steps=200, seed=0, random_steps=160, width=8, batch=8)
+    assert acted == 40 * [False]
+    first = np.array(Watched.actions[:160])
+    assert first.min() < -0.9 and first.max() > 0.9
+    assert abs(first.mean()) < 0.15 and first.std() == pytest.approx(3**-0.5, abs=0.06)
+
+
+def test_observations_of_an_even_spread_are_brought_to_mean_0_and_deviation_1():
+    """What hardly moves is divided by 0.02, and nothing gets beyond 5."""
+    sac = small()
+    for x in (-1.0, 1.0):
+        sac.normalise.observe(np.float32([3 + 2 * x, 0.001 * x, 7]))
+    s = sac.normalise(torch.tensor([[5.0, 0.01, 7.5], [1.0, 0.0, 6.99]]))
+    assert torch.allclose(s, torch.tensor([[1.0, 0.5, 5.0], [-1.0, 0.0, -0.5]]), atol=1e-4)
+
+
+def test_an_actors_deviation_stays_between_exp_of_minus_5_and_2():
+    actor = Actor(1, 2, 8)
+    actor.net[-1].weight.data.zero_()
+    actor.net[-1].bias.data = torch.tensor([0.3, -0.3, -50.0, 50.0])
+    mean, log_std = actor(torch.zeros(1, 1))
+    assert torch.allclose(mean, torch.tensor([[0.3, -0.3]]))
+    assert torch.allclose(log_std, torch.tensor([[-5.0, 2.0]]))
+    actor.net[-1].bias.data.zero_()
+    assert torch.allclose(actor(torch.zeros(1, 1))[1], torch.tensor([[-1.5, -1.5]]))
+
+
+def test_the_value_of_a_line_with_squared_costs_is_that_of_its_riccati_equation():
+    """s' = s + a / 2, reward -(s^2 + a^2 / 10): Q of the best policy, in closed form.
+
+    V(s) = -p s^2 with p = 1 + g p - (g p / 2)^2 / (1 / 10 + g p / 4). Critics that are trained on
+    targets of the best action, with a temperature of next to nothing, have to find it.
+    """
+    gamma = p = 0.8
+    for _ in range(200):
+        p = 1 + gamma * p - (gamma * p / 2) ** 2 / (0.1 + gamma * p / 4)
+    gain = (gamma * p / 2) / (0.1 + gamma * p / 4)
+    torch.manual_seed(0)
+    sac = SAC(1, 1, width=32, gamma=gamma, tau=0.1, critic_lr=5e-3, actor_lr=0.0, alpha=1e-8)
+    # The actor is held at the best policy, a = -gain s, which keeps |a| well below 1 here.
+    sac.actor.sample = lambda s: ((-gain * s).clamp(-1, 1), torch.zeros(len(s)))
+    rng = np.random.default_rng(0)
+    for _ in range(500):
+        s, a = (torch.as_tensor(rng.uniform(-0.5, 0.5, (64, 1)), dtype=torch.float32) for _ in "sa")
+        r = -(s.square() + a.square() / 10)[:, 0]
+        sac.update({"obs": s, "action": a, "reward": r, "next_obs": s + a / 2,
+                    "terminal": torch.zeros(64)})  # fmt: skip
+    s, a = torch.meshgrid(torch.linspace(-0.4, 0.4, 9), torch.linspace(-0.4, 0.4, 9), indexing="ij")
+    s, a = s.reshape(-1, 1), a.reshape(-1, 1)
+    true = -(s.square() + a.square() / 10 + gamma * p * (s + a / 2).square())[:, 0]
+    with torch.no_grad():
+        found = sac.critic(s, a)
+    assert (found - true).abs().mean() < 0.02 < true.abs().mean() / 3
+
+
 def test_a_full_buffer_forgets_the_oldest():
     buffer = ReplayBuffer(1, 1, 3)
     for i in range(5):
@@ -339,13 +439,20 @@ def test_the_actor_that_earns_most_without_noise_is_chosen():
 
 
 def test_averaged_actors_of_the_best_windows_and_of_the_end_compete(monkeypatch):
-    """Returns of 40 episodes rise and fall: of four windows of ten, two are kept, the end joins."""
-    seen = []
+    """Returns of 40 episodes rise to the 25th and fall: the third window is best, then the second.
+
+    Of four windows of ten these two are kept, and the end joins.
+    """
+    seen, at_windows = [], []
+
+    def note(sac):
+        at_windows.append(deepcopy(sac.test_actor.state_dict()))
+        return {}
 
     class Tide(Walk):
         def step(self, action):
-            obs, _, terminal, late, info = super().step(action)
-            return obs, -abs(self.episode - 25.0), terminal, late, info
+            obs, _, terminal, _, info = super().step(action)
+            return obs, -abs(self.episode - 25.0), terminal, self.t >= 5, info
 
         def reset(self, seed=None, options=None):
             self.episode = getattr(self, "episode", 0) + 1
@@ -357,10 +464,13 @@ def test_averaged_actors_of_the_best_windows_and_of_the_end_compete(monkeypatch)
 
     monkeypatch.setattr(module, "CANDIDATES", 2)
     monkeypatch.setattr(module, "best_actor", choose)
-    kept, log = train(Tide(), steps=800, seed=0, random_steps=20, width=8, batch=8)
+    recipe = dict(steps=200, seed=0, random_steps=20, width=8, batch=8, evaluate_every=10)
+    recipe |= dict(updates=1)
+    kept, log = train(Tide(), evaluate=note, **recipe)
     assert len(log) == 40 and len(seen) == 3
-    for p, q in zip(kept.test_actor.state_dict().values(), seen[2].values(), strict=True):
-        assert torch.equal(p, q)
+    expected = [at_windows[2], at_windows[1], at_windows[3], kept.test_actor.state_dict()]
+    for one, other in zip([*seen, seen[2]], expected, strict=True):
+        assert all(torch.equal(p, q) for p, q in zip(one.values(), other.values(), strict=True))
 
 
 def test_the_learning_rates_stay_then_fall_to_zero():

@@ -1,5 +1,6 @@
 """The tasks as environments: the contract with Gymnasium, fairness, and repeatability."""
 
+import itertools
 import subprocess
 import sys
 import warnings
@@ -106,6 +107,63 @@ def test_the_scripted_expert_always_succeeds(id, embodiment, episodes):
             _, _, _, late, info = env.step(action)
             assert not late or info["is_success"]
         assert info["is_success"], f"seed {seed}"
+    env.close()
+
+
+@pytest.mark.parametrize("id", IDS)
+def test_starts_are_drawn_from_as_far_as_the_jitter_says(id):
+    """Tip along x and z, and the object along x, each by itself and up to 2 cm to either side.
+
+    A drawer is never further open than its rail is long.
+    """
+    starts = {}
+    for jitter in (0.0, 0.02):
+        env = make(id, observation="state", jitter=jitter).unwrapped
+        starts[jitter] = np.array([env.reset(seed=seed)[0] for seed in range(60)])
+        env.close()
+    assert np.ptp(starts[0.0], axis=0) == pytest.approx(np.zeros(9), abs=1e-6)
+    middle = starts[0.0][0]
+    off = starts[0.02] - middle
+    assert middle[:3] == pytest.approx(env.START, abs=1e-5)
+    columns = [0, 2] if "Reach" in id else [0, 2, 3]
+    for i in columns:
+        assert np.abs(off[:, i]).max() <= 0.02 + 1e-4
+        least = 0.001 if "Drawer" in id and i == 3 else -0.01
+        assert off[:, i].min() < least < 0.01 < off[:, i].max(), f"column {i}"
+    assert np.abs(np.corrcoef(off[:, columns].T) - np.eye(len(columns))).max() < 0.4
+    assert off[:, 1] == pytest.approx(np.zeros(60), abs=1e-5)
+
+
+@pytest.mark.parametrize("id", IDS)
+def test_an_episode_goes_on_after_its_success(id):
+    env = make(id, observation="state").unwrapped
+    env.reset(seed=0)
+    solved = 0
+    for action in itertools.chain(expert_actions(env), 30 * [np.zeros(3)]):
+        _, reward, terminated, truncated, info = env.step(action)
+        solved += info["is_success"]
+        assert reward == info["is_success"] and not terminated and not truncated
+    assert solved > 5
+    env.close()
+
+
+@pytest.mark.parametrize("id", IDS)
+def test_the_tips_goal_moves_by_a_step_and_never_runs_ahead_of_a_stuck_tip(id):
+    """With the tip nailed down, in the middle of its box, whatever the arm does."""
+    env = make(id, observation="state").unwrapped
+    env.reset(seed=0)
+    middle = np.mean(env.WORKSPACE, axis=0)
+    env.arm.reset(middle)
+    nailed = middle, env.arm.tip_pose()[1]
+    env.arm.tip_pose = lambda: nailed
+    env._follow(np.array([0.1, 0.0, -0.1]))
+    np.testing.assert_allclose(env.arm.goal - middle, [0.1 * env.STEP, 0, -0.1 * env.STEP])
+    leash = np.broadcast_to(env.LEASH, 3)
+    for action in (np.ones(3), -np.ones(3)):
+        for _ in range(10):
+            env._follow(action)
+        wanted = np.clip(middle + action * leash, *env.WORKSPACE)
+        np.testing.assert_allclose(env.arm.goal, wanted, atol=1e-9)
     env.close()
 
 

@@ -246,3 +246,102 @@ def test_what_a_moved_view_shows_is_counted_back():
     moved = torch.tensor([0.1, -0.2]).expand(4, 1, 2)
     _, z = model(x, y, x, moved=moved)
     assert torch.allclose(z, model.keypoints(x) - moved)
+
+
+def plain_update(model, x, y, median, early, seen, moved):
+    """The weights after a step of rate 1, in the words of the docstrings."""
+    z = model.keypoints(seen) - moved
+    with torch.no_grad():
+        source, h_x = model.phi(x), tp.heat_map(model.keypoints(x), 0.1 + 0.2 * early)
+    h_y = tp.heat_map(z, 0.1 + 0.2 * early)
+    y_hat = model.refiner((1 - h_x) * (1 - h_y) * source + h_y * model.phi(y))
+    weight = 1 + 10 * (y - median).abs().mean(1, keepdim=True)
+    loss = (weight * (y_hat - y).square()).mean()
+    loss = loss + 0.06 * early * tp.crowding(z, 0.1 + 0.2 * early)
+    loss = loss + 0.02 * (1 - early) * tp.identity(z, y)
+    grads = torch.autograd.grad(loss, list(model.parameters()))
+    norm = torch.stack([g.norm() for g in grads]).norm()
+    share = min(1.0, 1 / (norm.item() + 1e-6))
+    return [p.detach() - share * g for p, g in zip(model.parameters(), grads, strict=True)]
+
+
+@pytest.mark.parametrize("early", [1.0, 0.4, 0.0])
+def test_an_update_descends_the_three_losses_of_what_the_augmented_frames_show(early, monkeypatch):
+    torch.manual_seed(1)
+    model, images = tp.Transporter(3), torch.rand(4, 4, 3, 84, 84) * 2 - 1
+    x, y, seen, bright = images
+    moved, median = torch.tensor([0.1, -0.2]).expand(4, 1, 2), 0.5 * images[0, :1]
+    asked = []
+    monkeypatch.setattr(tp, "shifted", lambda v, most: asked.append((v, most)) or (seen, moved))
+    monkeypatch.setattr(tp, "recoloured", lambda v, most: asked.append((v, most)) or bright)
+    monkeypatch.setattr(tp, "degraded", lambda v: asked.append((v, None)) or v + 0.05)
+    expected = plain_update(model, x, y, median, early, bright + 0.05, moved)
+    tp._update(model, torch.optim.SGD(model.parameters(), 1.0), x, y, median, early, 3, 180)
+    for p, wanted in zip(model.parameters(), expected, strict=True):
+        torch.testing.assert_close(p, wanted, atol=1e-5, rtol=1e-4)
+    assert [most for _, most in asked] == [3, 180, None]
+    assert all(v is given for (v, _), given in zip(asked, (y, seen, bright), strict=True))
+
+
+def test_without_shift_and_hue_only_the_camera_is_worse(monkeypatch):
+    torch.manual_seed(1)
+    model, y = tp.Transporter(2), torch.rand(2, 3, 84, 84) * 2 - 1
+    asked = []
+    monkeypatch.setattr(tp, "degraded", lambda v: asked.append(v) or v)
+    for name in ("shifted", "recoloured"):
+        monkeypatch.setattr(tp, name, None)
+    tp._update(model, torch.optim.SGD(model.parameters(), 1.0), y, y, 0 * y[:1], 0.5, 0, 0)
+    assert len(asked) == 1 and asked[0] is y
+
+
+def test_crowding_is_the_mean_overlap_of_two_different_keypoints():
+    z = torch.tensor([[[0.0, 0.0], [0.3, 0.4], [5.0, 5.0]]])  # 0.5 apart, and one far away
+    # twice exp(-0.5^2 / (2 * 0.5^2)) of 3^2 pairs
+    assert tp.crowding(z, 0.5).item() == pytest.approx(2 * np.exp(-0.5) / 9)
+    both = torch.cat([z, 0 * z])  # all three in one place: 6 of 9
+    assert tp.crowding(both, 0.5).item() == pytest.approx((2 * np.exp(-0.5) + 6) / 9 / 2)
+
+
+def test_training_starts_wide_and_ends_narrow_and_learns_along_a_cosine(monkeypatch):
+    """Two videos, black and white: the median is that of both, and all pairs are drawn of them."""
+    videos = [np.full((n, 84, 84, 3), level, np.uint8) for n, level in ((6, 0), (2, 255))]
+    seen = []
+
+    def update(model, optimizer, x, y, median, early, shift, hue):
+        assert model.training and x.shape == y.shape == (tp.BATCH, 3, 84, 84)
+        assert set(y.unique().tolist()) == {-1, 1} and (median == -1).all()
+        seen.append((early, optimizer.param_groups[0]["lr"], shift, hue))
+        return {}
+
+    monkeypatch.setattr(tp, "_update", update)
+    model, log = tp.train(videos, iterations=40, seed=0, K=2, shift=1, hue=2)
+    early, rate, shift, hue = map(np.array, zip(*seen, strict=True))
+    assert early[[0, 10, 20, 39]] == pytest.approx([1, 0.5, 0, 0])
+    assert rate[[0, 9, 20]] == pytest.approx(
+        [1e-4, 1e-3 * (1 + np.cos(np.pi * 9 / 40)) / 2, 1e-3], rel=1e-6
+    )
+    assert 0 < rate[-1] < 1e-5 and set(shift) == {1} and set(hue) == {2}
+    assert not model.training and [row["step"] for row in log] == [40]
+
+
+def test_layers_have_the_sizes_that_the_comments_say():
+    model, images = tp.Transporter(4), torch.zeros(2, 3, 84, 84)
+    assert model.phi(images).shape == (2, 32, 21, 21)
+    assert model.psi(images).shape == (2, 4, 21, 21)
+    assert model.refiner(model.phi(images)).shape == (2, 3, 84, 84)
+
+
+def test_a_cell_of_the_map_is_centred_on_its_four_pixels():
+    """Cell i looks as far left of pixel 4 i + 1.5 as right of it."""
+    encoder = tp._encoder()
+    for layer in encoder.modules():
+        if isinstance(layer, torch.nn.Conv2d):
+            torch.nn.init.ones_(layer.weight)
+        if isinstance(layer, torch.nn.GroupNorm):
+            layer.forward = lambda v: v
+    v = torch.ones(1, 3, 84, 84, requires_grad=True)
+    (seen,) = torch.autograd.grad(encoder(v)[0, 0, 10, 12], v)
+    at = torch.arange(84.0)
+    rows, columns = seen.sum((0, 1, 3)), seen.sum((0, 1, 2))
+    centre = [(w @ at / w.sum()).item() for w in (rows, columns)]
+    assert centre == pytest.approx([4 * 10 + 1.5, 4 * 12 + 1.5])
