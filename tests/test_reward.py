@@ -233,9 +233,9 @@ def test_what_moves_less_than_a_tenth_of_the_robots_median_step_is_at_rest():
     crawl = [3 + 0.004 * i for i in range(1, 21)]
     z = prepare(line(*walk, *crawl, 4, 5), robot, speed=False)
     assert z[:, 0, 0].tolist() == pytest.approx([*walk, *crawl[:5], 4, 5])
-    faster = [3 + 0.11 * i for i in range(1, 6)]
+    faster = [3 + 0.045 * i for i in range(1, 21)]  # a tenth within three frames
     z = prepare(line(*walk, *faster, 4, 5), robot, speed=False)
-    assert len(z) == 11
+    assert len(z) == 26
 
 
 def test_one_glitch_is_gone_before_anything_is_measured():
