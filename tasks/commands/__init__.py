@@ -18,6 +18,7 @@ from tasks.world.env import MOST_JITTER
 
 COMMANDS = {  # each a file in this folder
     "record": "film the human videos of a task again",
+    "stage": "a page to film your own arm with",
     "export": "the experts' actions, states and frames as a Minari dataset",
     "table": "the results of all tasks; what is missing is run first",
     "ablation": "what each mend of the reward is worth",

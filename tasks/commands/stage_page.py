@@ -1,0 +1,190 @@
+"""The page of `stage`: its words, its looks and its script."""
+
+from __future__ import annotations
+
+WHAT_TO_DO = {
+    "reach": """Put something small and colourful where the solid outline is, such as a bottle cap
+on a stand. Start with the hand where the arm is drawn, fingers down, and bring the finger tips to
+it. Stay there for a moment.""",
+    "push": """Put a small box or a can where the solid outline is. Start with the hand where the
+arm is drawn, fingers down. Come down behind the object and push it along the table to the dashed
+outline. Stay there for a moment.""",
+    "slide": """Put something flat that slides well where the solid outline is, such as a puck or a
+coaster. Come down behind it and give it one hit, so that it slides on alone and stops at the dashed
+outline. Keep recording until it rests.""",
+    "coffee": """Put a mug where the solid outline is, and something tall where the machine is.
+Come down behind the mug and push it under the machine, to the dashed outline.""",
+    "drawer": """Open a drawer, or stand a box on the table, with its front at the solid outline.
+Push the front with the finger tips until it is where the dashed outline is.""",
+}
+
+PAGE = """<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta http-equiv="Content-Security-Policy" content="default-src 'none'; img-src data:;
+ style-src 'unsafe-inline'; script-src 'unsafe-inline'; media-src blob:; connect-src blob:">
+<title>Film your arm: {task}</title>
+<style>
+:root { color-scheme: light dark; --edge: #888; --panel: #f2f4f7 }
+@media (prefers-color-scheme: dark) { :root { --panel: #23272e } }
+* { box-sizing: border-box }
+body { margin: 0 auto; max-width: 60rem; padding: 1rem; font: 1rem/1.5 system-ui, sans-serif }
+h1 { font-size: 1.5rem; margin: .3rem 0 .6rem }
+.stage { position: relative; background: #000; aspect-ratio: 4 / 3; border-radius: 8px;
+         overflow: hidden }
+.stage video, .stage svg { position: absolute; inset: 0; width: 100%; height: 100%;
+         object-fit: contain }
+.stage svg { pointer-events: none; opacity: var(--shown, .9) }
+path { fill: none; stroke-width: .55; stroke-linejoin: round }
+.scene { stroke: #ccc; stroke-width: .3 }
+.arm { stroke: #56B4E9 }
+.object { stroke: #E69F00 }
+.goal { stroke: #E69F00; stroke-dasharray: 1.6 1.2 }
+#count { position: absolute; inset: 0; display: grid; place-items: center; font-size: 7rem;
+         color: #fff; text-shadow: 0 0 1rem #000 }
+.bar { display: flex; flex-wrap: wrap; gap: .6rem; align-items: center; margin: .8rem 0 }
+button, .bar a { font: inherit; padding: .55rem 1.1rem; border: 1px solid var(--edge);
+         border-radius: 8px; background: var(--panel); color: inherit; text-decoration: none }
+button:disabled { opacity: .45 }
+#record { background: #b3261e; color: #fff; border-color: #b3261e }
+#told { min-height: 1.5em }
+code { background: var(--panel); padding: .1rem .3rem; border-radius: 4px }
+[hidden] { display: none !important }
+</style>
+</head>
+<body data-state="starting">
+<main>
+<h1>Film your arm: {task}</h1>
+<p>{what}</p>
+<div class="stage">
+<video id="live" autoplay muted playsinline aria-label="The camera's picture"></video>
+<video id="film" controls loop playsinline hidden aria-label="What was recorded"></video>
+<svg viewBox="0 0 {size} {size}" role="img"
+ aria-label="Outline of the scene: arm blue, object orange, its goal dashed">
+{outlines}
+</svg>
+<div id="count" aria-hidden="true"></div>
+</div>
+<div class="bar">
+<button id="record" disabled>Record</button>
+<button id="stop" hidden>Stop</button>
+<button id="again" hidden>Again</button>
+<a id="save" hidden>Save</a>
+<label>Camera <select id="cameras"></select></label>
+<label>Outline <input id="shown" type="range" min="0" max="1" step="0.05" value="0.9"></label>
+</div>
+<p id="told" role="status"></p>
+<p id="other" hidden><label>Film it with the camera's own app instead:
+<input id="file" type="file" accept="video/*" capture="environment"></label></p>
+<ul>
+<li>Camera: to the side of the table, a little above it, and still. Lean it against something.</li>
+<li>Arm: from the left, bare or in a sleeve, with nothing else that moves in the picture.</li>
+<li>The outline is a help. A clip need not fit it exactly, but object and goal have to be in the
+picture.</li>
+<li>Nothing leaves this machine: the page has no way to send anything.</li>
+</ul>
+<p>Then, beside the kit: <code>python -m tasks prepare {task} <span id="clip">CLIP</span></code></p>
+</main>
+<script>
+"use strict";
+const NAME = {name}, LONGEST = 20, FORMATS = [
+  ["video/mp4;codecs=avc1", "mp4"], ["video/webm;codecs=vp9", "webm"],
+  ["video/webm;codecs=vp8", "webm"], ["video/webm", "webm"], ["video/mp4", "mp4"]];
+const at = id => document.getElementById(id);
+let stream, recorder, parts, clock;
+
+function state(name, told) {
+  document.body.dataset.state = name;
+  at("told").textContent = told || "";
+  at("record").hidden = !["starting", "live", "none"].includes(name);
+  at("record").disabled = name !== "live";
+  at("stop").hidden = name !== "recording";
+  at("again").hidden = at("save").hidden = at("film").hidden = name !== "recorded";
+  at("live").hidden = name === "recorded";
+  document.querySelector(".stage svg").style.visibility = name === "recorded" ? "hidden" : "";
+}
+
+function none(why) {
+  state("none", why);
+  at("other").hidden = false;
+}
+
+async function start(id) {
+  if (!navigator.mediaDevices || !window.MediaRecorder)
+    return none("This browser gives a page that is a file no camera. On a phone that is usual.");
+  if (stream) stream.getTracks().forEach(track => track.stop());
+  const which = id ? {deviceId: {exact: id}} : {facingMode: "environment"};
+  const size = {width: {ideal: 1280}, height: {ideal: 720}, frameRate: {ideal: 30}};
+  try {
+    stream = await navigator.mediaDevices.getUserMedia({video: {...which, ...size}, audio: false});
+  } catch (error) {
+    return none({
+      NotAllowedError: "The camera was not allowed. Allow it in the address bar and load again.",
+      NotFoundError: "No camera was found. Plug one in and load again.",
+      NotReadableError: "The camera is in use by another program. Close that and load again.",
+    }[error.name] || `No camera: ${error.message}`);
+  }
+  at("live").srcObject = stream;
+  await at("live").play();
+  const now = stream.getVideoTracks()[0].getSettings().deviceId;
+  const all = await navigator.mediaDevices.enumerateDevices();
+  const cameras = all.filter(device => device.kind === "videoinput");
+  at("cameras").replaceChildren(...cameras.map(({label, deviceId}, i) =>
+    new Option(label || `camera ${i + 1}`, deviceId, false, deviceId === now)));
+  state("live", "Line up object and arm, then record. It counts to three first.");
+}
+
+async function record() {
+  const known = FORMATS.find(([type]) => MediaRecorder.isTypeSupported(type));
+  if (!known) return none("This browser cannot record; Chrome and Firefox can.");
+  state("counting");
+  for (const n of [3, 2, 1]) {
+    at("count").textContent = n;
+    await new Promise(done => setTimeout(done, 1000));
+  }
+  at("count").textContent = "";
+  parts = [];
+  recorder = new MediaRecorder(stream, {mimeType: known[0], videoBitsPerSecond: 8e6});
+  recorder.ondataavailable = event => parts.push(event.data);
+  recorder.onstop = () => recorded(known[1]);
+  recorder.start(500);
+  const from = Date.now();
+  state("recording", "Recording.");
+  clock = setInterval(() => {
+    const passed = (Date.now() - from) / 1000;
+    at("told").textContent = `Recording, ${passed.toFixed(0)} s.`;
+    if (passed > LONGEST) recorder.stop();
+  }, 250);
+}
+
+function recorded(ending) {
+  clearInterval(clock);
+  show(new Blob(parts, {type: recorder.mimeType}), `${NAME}.${ending}`);
+}
+
+function show(blob, name) {
+  const url = URL.createObjectURL(blob);
+  at("film").src = url;
+  at("film").play();
+  Object.assign(at("save"), {href: url, download: name});
+  at("clip").textContent = name;
+  state("recorded", `Recorded, ${(blob.size / 1e6).toFixed(1)} MB. Look at it, then save it.`);
+}
+
+at("record").onclick = record;
+at("stop").onclick = () => recorder.stop();
+at("again").onclick = () => stream ? state("live") : location.reload();
+at("cameras").onchange = event => start(event.target.value);
+at("shown").oninput = event =>
+  document.querySelector(".stage").style.setProperty("--shown", event.target.value);
+at("file").onchange = event => {
+  const file = event.target.files[0];
+  if (file) show(file, file.name);
+};
+start();
+</script>
+</body>
+</html>
+"""

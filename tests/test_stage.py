@@ -1,0 +1,105 @@
+"""The page to film oneself with: its outline, its silence, and a recording in a real browser."""
+
+import asyncio
+import base64
+import re
+
+import browser
+import cv2
+import numpy as np
+import pytest
+
+import tasks
+from lbw_minimal import video
+from tasks.__main__ import main
+from tasks.commands.stage import outlines, page
+
+
+def box(polygons):
+    """Left, top, right and bottom of polygons."""
+    points = np.concatenate(polygons)
+    return np.concatenate([points.min(0), points.max(0)])
+
+
+@pytest.mark.parametrize("name", tasks.TASKS)
+def test_outlines_lie_where_the_picture_changes(name):
+    """The arm's contains the tip, and the object's the object; none leaves the picture."""
+    env = tasks.bare(name, embodiment="human", observation="state")
+    env.reset(seed=0)
+    drawn = outlines(env)
+    tip, thing = np.split(env.true_pixels(), 2)
+    thing = env.world.pixel(env.target_position()) if name == "reach" else thing
+    left, _, right, bottom = box(drawn["arm"])
+    assert left - 1 <= tip[0] <= right + 1 and bottom == pytest.approx(tip[1], abs=4)
+    left, top, right, bottom = box(drawn["object"])
+    assert left <= thing[0] <= right and top <= thing[1] <= bottom
+    assert right - left < 42 and bottom - top < 30 and drawn["scene"]
+    assert all(0 <= v <= 84 for part in drawn.values() for v in box(part))
+    env.close()
+
+
+@pytest.mark.parametrize("name", tasks.TASKS)
+def test_the_goal_is_drawn_where_the_object_has_to_get(name):
+    text = page(name)
+    env = tasks.bare(name, embodiment="human", observation="state")
+    env.reset(seed=0)
+    way = env.world.pixel(env.target_position()) - env.world.pixel(env.object_position())
+    env.close()
+    paths = dict(re.findall(r'<path class="(\w+)" d="(.*?)"/>', text))
+    assert ("goal" in paths) == (name != "reach")
+    if "goal" in paths:
+        start, goal = (
+            np.array(re.findall(r"[\d.e-]+", paths[k]), float) for k in ("object", "goal")
+        )
+        shift = (goal - start).reshape(-1, 2)
+        assert shift == pytest.approx(np.broadcast_to(way, shift.shape), abs=1e-3)
+
+
+def test_the_page_says_what_to_do_and_asks_nobody_for_anything(tmp_path, capsys):
+    assert main(["stage", "coffee", "--out", str(tmp_path)]) == 0
+    assert capsys.readouterr().out == f"stage: {tmp_path / 'coffee.html'}\n"
+    text = (tmp_path / "coffee.html").read_text(encoding="utf-8")
+    assert "default-src 'none'" in text and "Put a mug" in text
+    assert not re.search(r"https?://|src=|href=\"", text)
+    assert not re.search(r"\{(task|what|size|outlines|name)\}", text)
+
+
+@pytest.mark.skipif(not browser.CHROMIUM, reason="needs Chromium")
+def test_a_browser_records_what_its_camera_sees(tmp_path):
+    """A file stands in for the camera: a white square that goes right, 640 x 480."""
+    (tmp_path / "push.html").write_text(page("push"), encoding="utf-8")
+    film = np.full((25, 480, 640, 3), 90, np.uint8)
+    for t, frame in enumerate(film):
+        frame[200:260, 120 + 14 * t : 180 + 14 * t] = 240
+    yuv = (cv2.cvtColor(frame, cv2.COLOR_RGB2YUV_I420).tobytes() for frame in film)
+    (tmp_path / "camera.y4m").write_bytes(
+        b"YUV4MPEG2 W640 H480 F25:1 Ip A1:1 C420\n" + b"".join(b"FRAME\n" + f for f in yuv)
+    )
+    camera = ("--use-fake-device-for-media-stream", "--use-fake-ui-for-media-stream",
+              f"--use-file-for-fake-video-capture={tmp_path / 'camera.y4m'}")  # fmt: skip
+    state, click = "document.body.dataset.state", "document.getElementById('{}').click()"
+    read = """fetch(document.getElementById("save").href).then(r => r.blob()).then(blob =>
+        new Promise(done => {
+            const reader = new FileReader();
+            reader.onload = () => done(reader.result);
+            reader.readAsDataURL(blob);
+        }))"""
+
+    async def record():
+        async with browser.opened(tmp_path / "push.html", tmp_path / "profile", *camera) as shown:
+            await shown.until(state, "live")
+            await shown.js(click.format("record"))
+            await shown.until(state, "recording")
+            await asyncio.sleep(3)
+            await shown.js(click.format("stop"))
+            await shown.until(state, "recorded")
+            name = await shown.js("document.getElementById('save').download")
+            assert await shown.js("document.getElementById('clip').textContent") == name
+            return name, base64.b64decode((await shown.js(read)).split(",", 1)[1])
+
+    name, data = asyncio.run(record())
+    assert re.fullmatch(r"push-clip\.(mp4|webm)", name)
+    (tmp_path / name).write_bytes(data)
+    frames = video.read(tmp_path / name)[0]
+    places = [np.argwhere(frame.mean(-1) > 180).mean(0) for frame in frames]
+    assert len(frames) > 20 and np.ptp(places, axis=0)[1] > 40 > 5 > np.ptp(places, axis=0)[0]
