@@ -187,7 +187,7 @@ class Checkpoint:
         self._last = time.monotonic()
 
 
-def progress(total: int, name: str, start: int = 0) -> tqdm:
-    """A tqdm bar on stderr that also reads well in a log file."""
-    live = sys.stderr.isatty()
-    return tqdm(total=total, initial=start, desc=name, mininterval=0.3 if live else 15, ncols=100)
+def progress(total: int, name: str, start: int = 0, delay: float = 0) -> tqdm:
+    """A tqdm bar on stderr that also reads well in a log file; it shows after `delay` seconds."""
+    every = 0.3 if sys.stderr.isatty() else 15
+    return tqdm(total=total, initial=start, desc=name, mininterval=every, ncols=100, delay=delay)

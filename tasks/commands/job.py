@@ -111,7 +111,8 @@ def check(name: str, args: argparse.Namespace, argv: list[str]) -> Job:
     torch.set_num_threads(args.threads or os.cpu_count() or 1)
 
     experts = [read_video(path) for path in videos(name, args)]
-    random = experts[0][:0] if args.video else read_video(tasks.VIDEOS / name / "random.mp4")
+    waving = tasks.VIDEOS / name / "random.mp4"
+    random = experts[0][:0] if args.video else read_video(waving, whole=True)
     if lbw:  # whose demonstration is one: the translation sees the others beside random motion
         random = np.concatenate([random, *experts[1:]])
     weights, out = args.weights or tasks.WEIGHTS / name, args.out or Path("runs") / name
@@ -161,9 +162,9 @@ def videos(name: str, args: argparse.Namespace) -> list[Path]:
     return [tasks.VIDEOS / name / f"expert_{i + 1:02d}.mp4" for i in range(count)]
 
 
-def read_video(path: Path) -> np.ndarray:
+def read_video(path: Path, whole: bool = False) -> np.ndarray:
     """The frames (T, 84, 84, 3) uint8 of a file; what is odd about it is said."""
-    frames, warnings = video.read(path)
+    frames, warnings = video.read(path, whole)
     for warning in warnings:
         print(f"warning: {warning}", file=sys.stderr)
     return frames

@@ -51,7 +51,7 @@ class Cycled:
         )
         demo = demo_of("push")
         if not path.exists():
-            random = video.read(tasks.VIDEOS / "push" / "random.mp4")[0]
+            random = video.read(tasks.VIDEOS / "push" / "random.mp4", whole=True)[0]
             recipe = json.loads((folder(runs, "push", 0) / "settings.json").read_text())["recipe"]
             robot = tasks.pace_film("push", 0, recipe["robot_frames"])
             v = [cyclegan.translate(model, frames) for frames in (demo, random)]
