@@ -1,0 +1,276 @@
+"""People's clips: whatever wrote the file, what it shows comes out upright, squared, in ordinary
+colours and at its true time; what cannot be read gets one true sentence."""
+
+import av
+import cv2
+import numpy as np
+import pytest
+
+from lbw_minimal import clip as clips
+from lbw_minimal.clip import read_clip, resample, steady
+from lbw_minimal.training import InputError
+from tests.toy_clips import H, W, add, arm, encode, reach, room, shows
+
+KINDS = {
+    "h264.mp4": ("libx264", None, {}),
+    "hevc.mov": ("libx265", None, {"x265-params": "log-level=none"}),
+    "av1.mp4": ("libsvtav1", None, {"preset": "12"}),
+    "vp8.webm": ("libvpx", None, {"deadline": "realtime"}),
+    "vp9.webm": ("libvpx-vp9", None, {"deadline": "realtime"}),
+    "old.avi": ("mjpeg", "yuvj420p", {}),
+    "mpeg4.3gp": ("mpeg4", None, {}),
+    "camera.ts": ("mpeg2video", None, {}),
+    "cut.mkv": ("ffv1", None, {}),
+    "prores.mov": ("prores_ks", "yuv422p10le", {}),
+    "moving.gif": ("gif", "rgb8", {}),
+}
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_every_kind_of_file_shows_what_was_filmed(tmp_path, name, capfd):
+    codec, fmt, options = KINDS[name]
+    path = encode(tmp_path / name, reach(), codec, fmt=fmt, options=options)
+    capfd.readouterr()  # some encoders talk
+    clip = read_clip(path)
+    assert clip.frames.shape == (30, H, W, 3) and clip.frames.dtype == np.uint8
+    assert shows(clip.frames, reach()) < (25 if "gif" in name else 8)
+    np.testing.assert_allclose(clip.times, np.arange(30) / 25, atol=0.011)  # gif counts hundredths
+    assert (clip.cuts, clip.notes, clip.losses) == ([], [], [])
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("name", ["12:30.mp4", "arm%03d.mp4", "mein Arm – ä é 手.mp4", "#1?.mp4"])
+def test_a_name_is_only_a_name(tmp_path, monkeypatch, name):
+    encode(tmp_path / "plain.mp4", reach(10))
+    try:
+        (tmp_path / "plain.mp4").rename(tmp_path / name)
+    except OSError:
+        pytest.skip("this system has no such names")
+    monkeypatch.chdir(tmp_path)
+    assert len(read_clip(name).frames) == 10
+
+
+@pytest.mark.parametrize("rate", [10, 30, 60, 240])
+def test_a_motion_of_one_second_takes_25_frames_at_any_rate(tmp_path, rate):
+    clip = read_clip(encode(tmp_path / "a.mp4", reach(rate + 1), rate=rate))
+    assert len(clip.frames) == rate + 1 and clip.times[-1] == pytest.approx(1, abs=1e-3)
+    shown = clip.frames[resample(clip.times)]
+    # Where the arm ends at each of 26 moments, to half a frame of the clip.
+    assert len(shown) == 26
+    off = shows(shown, arm(0.1 + 0.5 * np.rint(np.arange(26) / 25 * rate) / rate))
+    assert off < 8 and clip.cuts == []
+
+
+def test_variable_rates_keep_their_times(tmp_path):
+    times = np.r_[0:10, 12:30:3] / 25  # from 25 frames a second to 8, as in low light
+    path = encode(tmp_path / "a.mp4", arm(0.1 + 0.4 * times), times=times)
+    np.testing.assert_allclose(read_clip(path).times, times, atol=1e-3)
+
+
+def test_resampling_takes_the_nearest_frame_and_invents_none():
+    assert resample(np.arange(4) / 25).tolist() == [0, 1, 2, 3]
+    assert resample(np.array([0, 0.1, 0.2])).tolist() == [0, 0, 1, 1, 2, 2]
+    assert resample(np.array([0.0, 0.3]), rate=10).tolist() == [0, 0, 1, 1]
+    assert resample(np.arange(7) / 50).tolist() == [0, 2, 4, 6]
+
+
+def test_slow_motion_that_says_so_is_played_at_true_speed(tmp_path):
+    path = encode(
+        tmp_path / "a.mp4", reach(61), rate=30, metadata={clips.CAPTURED: "240.0"},
+        container={"movflags": "use_metadata_tags"},
+    )  # fmt: skip
+    clip = read_clip(path)
+    assert clip.times[-1] == pytest.approx(60 / 240, abs=1e-3) and "Slow motion" in clip.notes[0]
+
+
+def test_a_stream_without_time_stamps_takes_its_rate_and_says_so(tmp_path):
+    path = encode(tmp_path / "raw.h264", reach(20), rate=25)
+    clip = read_clip(path)
+    np.testing.assert_allclose(clip.times, np.arange(20) / 25, atol=1e-6)
+
+
+def test_frames_that_an_edit_list_hides_stay_hidden(tmp_path):
+    """As lossless trimmers write it: coding begins at a key frame that is not to be shown."""
+    encode(tmp_path / "a.mp4", reach(30), options={"bf": "0"})
+    with av.open(str(tmp_path / "a.mp4")) as whole, av.open(str(tmp_path / "b.mp4"), "w") as out:
+        stream = out.add_stream_from_template(whole.streams.video[0])
+        for packet in whole.demux(video=0):
+            if packet.dts is not None:
+                shift = round(12 / 25 / packet.time_base)
+                packet.pts, packet.dts = packet.pts - shift, packet.dts - shift
+                packet.stream = stream
+                out.mux(packet)
+    clip = read_clip(tmp_path / "b.mp4")
+    assert shows(clip.frames, reach(30)[12:]) < 8 and clip.times[0] == 0
+
+
+def interlaced(path, codec, options):
+    """Fields that are half a frame apart: a bright bar moves by 8 pixels between them."""
+    fields = np.repeat(room()[None], 40, axis=0)
+    for t, field in enumerate(fields):
+        field[:, 8 + 3 * t : 20 + 3 * t] = 230
+    frames = fields[::2].copy()
+    frames[:, 1::2] = fields[1::2, 1::2]
+    encode(path, frames, codec, options=options)
+    return fields[::2]
+
+
+@pytest.mark.parametrize(
+    "name, codec, options",
+    [
+        ("dvd.mpg", "mpeg2video", {"flags": "+ildct+ilme", "b": "4M"}),
+        ("avchd.mts", "libx264", {"flags": "+ildct+ilme", "x264-params": "tff=1"}),
+    ],
+)
+def test_interlaced_frames_show_one_moment(tmp_path, name, codec, options):
+    fields = interlaced(tmp_path / name, codec, options)
+    clip = read_clip(tmp_path / name)
+    assert "Interlaced frames were made whole." in clip.notes
+    # A comb would alternate from row to row.
+    grey = clip.frames[5:15].mean(axis=3)
+    comb = np.abs(grey[:, 1:-1] - (grey[:, 2:] + grey[:, :-2]) / 2)
+    flat = np.abs((f := fields[5:15].mean(axis=3))[:, 1:-1] - (f[:, 2:] + f[:, :-2]) / 2)
+    assert comb.mean() < flat.mean() + 1
+
+
+def test_pixels_that_are_not_square_are_squared(tmp_path):
+    def wide(stream):
+        stream.codec_context.sample_aspect_ratio = 2
+
+    squeezed = np.stack([cv2.resize(f, (W // 2, H)) for f in reach()])
+    clip = read_clip(encode(tmp_path / "a.mp4", squeezed, prepare=wide))
+    assert clip.frames.shape[1:3] == (H, W) and shows(clip.frames, reach()) < 9
+    assert clip.notes == ["Its pixels, 2 times as wide as high, were squared."]
+
+
+TURNS = {  # the file's matrix, and what is done to the stored picture
+    "90": ((0, 1, -1, 0), lambda f: np.rot90(f, -1, (1, 2))),
+    "180": ((-1, 0, 0, -1), lambda f: f[:, ::-1, ::-1]),
+    "270": ((0, -1, 1, 0), lambda f: np.rot90(f, 1, (1, 2))),
+    "mirrored": ((-1, 0, 0, 1), lambda f: f[:, :, ::-1]),
+    "mirrored, 90": ((0, -1, -1, 0), lambda f: np.rot90(f[:, :, ::-1], -1, (1, 2))),
+}
+
+
+@pytest.mark.parametrize("name", TURNS)
+def test_pictures_stand_upright(tmp_path, name):
+    (a, b, c, d), turned = TURNS[name]
+
+    def turn(stream):
+        one = 1 << 16
+        stream.set_display_matrix([a * one, b * one, 0, c * one, d * one, 0, 0, 0, 1 << 30])
+
+    clip = read_clip(encode(tmp_path / "a.mp4", reach(), prepare=turn))
+    assert shows(clip.frames, turned(reach())) < 8
+    assert any("as the file asks" in note for note in clip.notes)
+
+
+def test_a_turn_can_be_asked_for(tmp_path):
+    clip = read_clip(encode(tmp_path / "a.mp4", reach()), turn=90)
+    assert shows(clip.frames, np.rot90(reach(), -1, (1, 2))) < 8
+
+
+@pytest.mark.parametrize("top, left", [(40, 0), (0, 60)], ids=["letterbox", "pillarbox"])
+def test_black_borders_are_cut_off(tmp_path, top, left):
+    boxed = np.zeros((30, H + 2 * top, W + 2 * left, 3), np.uint8)
+    boxed[:, top : top + H, left : left + W] = reach()
+    clip = read_clip(encode(tmp_path / "a.mp4", boxed))
+    h, w = clip.frames.shape[1:3]
+    assert H - 6 <= h <= H and W - 6 <= w <= W and clip.notes == ["Black borders were cut off."]
+    assert len(read_clip(tmp_path / "a.mp4", crop=False).frames[0]) == H + 2 * top
+
+
+def test_a_boxed_picture_keeps_its_pixels(tmp_path):
+    """An upright clip in a wide film: shrunk as a whole, it would be 101 pixels wide."""
+    upright = arm(np.linspace(0.1, 0.6, 8), room(360, 200))
+    boxed = np.zeros((8, 360, 640, 3), np.uint8)
+    boxed[:, :, 220:420] = upright
+    clip = read_clip(encode(tmp_path / "a.mp4", boxed))
+    assert 310 <= clip.frames.shape[1] <= 320 and 170 <= clip.frames.shape[2] <= 180
+
+
+def test_a_dark_room_is_no_border(tmp_path):
+    dark = np.zeros((20, H, W, 3), np.uint8)
+    for t, frame in enumerate(dark):  # a lit hand before black
+        cv2.circle(frame, (30 + 4 * t, 48), 20, (220, 180, 150), -1)
+    assert read_clip(encode(tmp_path / "a.mp4", dark)).frames.shape[1:3] == (H, W)
+
+
+@pytest.mark.parametrize("still_first", [True, False])
+def test_the_stream_that_moves_is_taken(tmp_path, still_first):
+    still = np.repeat(room(2 * H, 2 * W, seed=1)[None], 30, axis=0)  # larger, and still
+    films = [still, reach()] if still_first else [reach(), still]
+    with av.open(str(tmp_path / "a.mp4"), "w") as out:
+        out.mux([packet for film in films for packet in add(out, film, "libx264")])
+    clip = read_clip(tmp_path / "a.mp4")
+    assert shows(clip.frames, reach()) < 8
+    number = 2 if still_first else 1
+    assert clip.notes == [f"Of the file's 2 streams of pictures, number {number} was taken."]
+    other = read_clip(tmp_path / "a.mp4", stream=3 - number)
+    assert other.frames.shape[1] == 2 * H
+    with pytest.raises(InputError, match="stream 3 is not among its 2 of pictures"):
+        read_clip(tmp_path / "a.mp4", stream=3)
+
+
+def loop(n=40, start=15):
+    """A loop that starts in the middle: the arm reaches its end, is back, and goes on."""
+    frames = reach(n)
+    return np.concatenate([frames[start:], frames[:start]]), n - start
+
+
+@pytest.mark.parametrize("rate", [10, 25, 60])
+def test_a_jump_cut_is_found_and_the_longest_piece_kept(tmp_path, rate):
+    frames, cut = loop()
+    clip = read_clip(encode(tmp_path / "a.mp4", frames, rate=rate))
+    assert clip.cuts == [cut]
+    piece = steady(clip)
+    assert len(piece.frames) == cut and piece.cuts == [] and piece.times[0] == 0
+    assert np.array_equal(piece.frames, clip.frames[:cut])
+
+
+def test_noise_and_a_start_from_rest_are_no_cuts(tmp_path):
+    frames = arm(np.r_[np.full(15, 0.1), 0.1 + 0.5 * np.sin(np.linspace(0, np.pi / 2, 12)) ** 2])
+    noisy = frames + np.random.default_rng(0).normal(0, 8, frames.shape)
+    path = encode(tmp_path / "a.mp4", np.clip(noisy, 0, 255).astype(np.uint8))
+    assert read_clip(path).cuts == []
+
+
+def test_a_motion_that_nobody_filmed_is_a_cut_and_a_pause_is_none(tmp_path):
+    times = np.r_[0:15, 40:55] / 25  # a second is missing
+    path = encode(tmp_path / "a.mp4", arm(0.1 + 0.2 * times), times=times)
+    assert read_clip(path).cuts == [15]
+    path = encode(tmp_path / "b.mp4", arm(0.1 + 0.2 * np.r_[0:15, 15:30] / 25), times=times)
+    assert read_clip(path).cuts == []
+
+
+def test_a_long_film_is_read_where_it_moves(tmp_path, monkeypatch):
+    """Six seconds into twenty the arm comes. Memory for a fifth of it is enough."""
+    monkeypatch.setattr(clips, "MOST", 5 * 25 * H * W * 3)
+    shares = np.r_[np.full(150, 0.1), np.linspace(0.1, 0.6, 50), np.full(300, 0.6)]
+    for options in ({"g": "25"}, {"g": "500"}):  # key frames that show it, and one only
+        clip = read_clip(encode(tmp_path / "a.mp4", arm(shares), options=options))
+        assert clip.times[-1] < 5.1 and np.diff(clip.times).max() < 0.05
+        assert shows(clip.frames[:15], arm(np.full(15, 0.1))) < 8
+        assert shows(clip.frames[-15:], arm(np.full(15, 0.6))) < 8
+        assert "the longest stretch in which something moves" in clip.losses[-1]
+
+
+def test_memory_does_not_grow_with_the_length(tmp_path, monkeypatch):
+    monkeypatch.setattr(clips, "MOST", 20 * H * W * 3)
+    clip = read_clip(encode(tmp_path / "a.mp4", reach(100)), start=0, end=10)
+    assert len(clip.frames) <= 20 and "100 frames are many; every 8th is used" in clip.losses[0]
+    assert shows(clip.frames, reach(100)[::8]) < 8 and clip.cuts == []
+
+
+def test_a_piece_can_be_asked_for(tmp_path):
+    clip = read_clip(encode(tmp_path / "a.mp4", reach(100)), start=1.0, end=2.0)
+    assert len(clip.frames) == 26 and shows(clip.frames, reach(100)[25:51]) < 8
+
+
+def test_4k_is_shrunk_to_what_it_shows(tmp_path):
+    large = [cv2.resize(f, (3840, 2160), interpolation=cv2.INTER_NEAREST) for f in reach(4)]
+    path = encode(tmp_path / "a.mp4", large, options={"preset": "ultrafast"})
+    clip = read_clip(path)
+    assert clip.frames.shape == (4, 180, 320, 3)
+    small = [cv2.resize(f, (320, 180), interpolation=cv2.INTER_AREA) for f in large]
+    assert shows(clip.frames, small) < 8

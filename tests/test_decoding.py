@@ -1,0 +1,180 @@
+"""What cannot be read gets one sentence with the file's name, the true reason and what helps."""
+
+import os
+import time
+
+import av
+import pytest
+from PIL import Image
+
+from lbw_minimal.clip import read_clip
+from lbw_minimal.training import InputError
+from tests.toy_clips import add, add_sound, encode, reach, room
+
+
+def write(path, data):
+    path.write_bytes(data)
+
+
+def film(folder, name="good.mp4", codec="libx264", n=30, **how):
+    whole = encode(folder / f"_{name}", reach(n), codec, **how)
+    data = whole.read_bytes()
+    whole.unlink()
+    return data
+
+
+def half(path):
+    data = film(path.parent)
+    write(path, data[: len(data) // 2])
+
+
+def half_with_its_index_first(path):
+    data = film(path.parent, options={"g": "5", "crf": "5"}, container={"movflags": "faststart"})
+    write(path, data[: len(data) // 2])
+
+
+def half_an_avi(path):
+    data = film(path.parent, "a.avi", "mjpeg", fmt="yuvj420p")
+    write(path, data[: len(data) // 2])
+
+
+def half_an_mkv(path):
+    data = film(path.parent, "a.mkv", "ffv1")
+    write(path, data[: len(data) // 2])
+
+
+def damaged_from_the_start(path):
+    write(path, os.urandom(3000) + film(path.parent)[3000:])
+
+
+def damaged_pictures(path):
+    data = bytearray(film(path.parent))
+    start, end = data.index(b"mdat") + 4, data.index(b"moov") - 4
+    data[start:end] = b"\xa5" * (end - start)
+    write(path, data)
+
+
+def no_decoder(path):
+    write(path, film(path.parent).replace(b"avc1", b"zzzz").replace(b"avcC", b"zzzC"))
+
+
+def sound(path):
+    with av.open(str(path), "w") as out:
+        out.mux(add_sound(out))
+
+
+def sound_with_a_cover(path):
+    def cover(stream):
+        stream.disposition = av.stream.Disposition.attached_pic
+
+    with av.open(str(path), "w", format="mp4") as out:
+        packets = add(out, room()[None], "mjpeg", 1, fmt="yuvj420p", prepare=cover)
+        out.mux(packets + add_sound(out))
+
+
+def picture(kind):
+    return lambda path: Image.fromarray(room()).save(path, kind)
+
+
+def sparse(path):
+    path.touch()
+    os.truncate(path, 2 << 30)
+
+
+def web_page(path):
+    path.write_text("<!DOCTYPE html><html><title>Sign in – ünïcode</title></html>\n" * 50)
+
+
+def archive(path):
+    write(path, b"PK\x03\x04" + os.urandom(5000))
+
+
+COPY = "copy or export it again"
+BAD = {
+    "missing": (lambda path: None, "there is no such file; check the path"),
+    "folder": (os.mkdir, "this is a folder; give the video file itself"),
+    "nothing inside": (lambda path: path.touch(), f"the file is empty; {COPY}"),
+    "zeros, 2 GB": (sparse, f"begins with nothing but zeros, .*; {COPY}"),
+    "text": (lambda path: path.write_text("no film\n"), "this is text, not a video; give an mp4"),
+    "web page": (web_page, "this is text, not a video; give an mp4"),
+    "archive": (archive, "this is a zip archive; unpack it"),
+    "noise": (
+        lambda path: write(path, os.urandom(9000)),
+        "no video that FFmpeg can read, or it is",
+    ),
+    "half": (half, f"cut short, its index is missing; {COPY}"),
+    "half, index first": (half_with_its_index_first, "promises 1.2 s and 0.[3-9] s can be read"),
+    "half an avi": (half_an_avi, "promises 1.2 s and 0.[3-9] s can be read"),
+    "half an mkv": (half_an_mkv, "promises 1.2 s and 0.[3-9] s can be read"),
+    "damaged start": (damaged_from_the_start, f"damaged from the start; .*{COPY}"),
+    "damaged pictures": (damaged_pictures, "none of its pictures can be decoded, it is damaged"),
+    "no decoder": (no_decoder, r"cannot be decoded here; export it as H.264 \(mp4\)"),
+    "sound": (sound, "has sound but no picture; give a video, recorded with the camera on"),
+    "sound with a cover": (sound_with_a_cover, "sound with a cover picture, not a video"),
+    "one frame": (
+        lambda path: encode(path, reach(1)),
+        "single frame, a still picture; give one in which the arm",
+    ),
+    **{
+        kind: (
+            picture(kind),
+            "a still picture; give (a video in|one in) which the arm does the task",
+        )
+        for kind in ("JPEG", "PNG", "GIF", "WEBP", "BMP", "TIFF")
+    },
+}
+
+
+@pytest.mark.parametrize("make, sentence", BAD.values(), ids=BAD.keys())
+def test_what_is_no_film_gets_one_sentence_and_a_remedy_at_once(tmp_path, capfd, make, sentence):
+    path = tmp_path / "mine.mp4"
+    make(path)
+    capfd.readouterr()
+    start = time.process_time()
+    with pytest.raises(InputError, match=rf"^{path}: [^\n]*{sentence}[^\n]*\.$"):
+        read_clip(path)
+    assert time.process_time() - start < 2
+    assert capfd.readouterr() == ("", "")
+
+
+def test_text_is_no_film_of_a_terminal(tmp_path):
+    (tmp_path / "notes.txt").write_text("this is no film\n" * 100)
+    with pytest.raises(InputError, match="this is text"):
+        read_clip(tmp_path / "notes.txt")
+
+
+@pytest.mark.skipif(os.name == "nt" or os.geteuid() == 0, reason="everybody may read it")
+def test_a_file_that_may_not_be_read_says_so(tmp_path):
+    encode(tmp_path / "mine.mp4", reach()).chmod(0)
+    with pytest.raises(InputError, match="Permission denied"):
+        read_clip(tmp_path / "mine.mp4")
+
+
+def test_zeros_behind_a_film_do_no_harm(tmp_path):
+    write(tmp_path / "a.mp4", film(tmp_path))
+    os.truncate(tmp_path / "a.mp4", 2 << 30)
+    assert len(read_clip(tmp_path / "a.mp4").frames) == 30
+
+
+def test_a_damaged_middle_is_left_out_and_said(tmp_path):
+    data = bytearray(film(tmp_path, n=60, options={"g": "10", "bf": "0"}))
+    middle = data.index(b"mdat") + (data.index(b"moov") - data.index(b"mdat")) // 2
+    data[middle : middle + 3000] = b"\xff" * 3000
+    write(tmp_path / "a.mp4", data)
+    clip = read_clip(tmp_path / "a.mp4")
+    assert 20 < len(clip.frames) <= 60 and "Damaged places were left out." in clip.losses
+
+
+def test_a_browsers_recording_that_was_broken_off_is_read_as_far_as_it_goes(tmp_path):
+    """Nothing in it says how long it was to be."""
+    data = film(tmp_path, "a.webm", "libvpx", options={"deadline": "realtime"},
+                container={"live": "1"})  # fmt: skip
+    write(tmp_path / "a.webm", data[: len(data) * 2 // 3])
+    assert 10 < len(read_clip(tmp_path / "a.webm").frames) < 30
+
+
+def test_sound_that_goes_on_does_not_make_a_film_cut_short(tmp_path):
+    with av.open(str(tmp_path / "a.mkv"), "w") as out:
+        packets = add(out, reach(), "libx264") + add_sound(out, seconds=4)
+        out.mux(sorted(packets, key=lambda p: p.dts * p.time_base))
+    assert len(read_clip(tmp_path / "a.mkv").frames) == 30
