@@ -260,7 +260,7 @@ def _why_closed(path):
 
 def _boxes(path):
     """The names of an mp4's outermost boxes."""
-    names, size = set(), path.stat().st_size
+    names, size = set[bytes](), path.stat().st_size
     with open(path, "rb") as f:
         at = 0
         while at + 8 <= size and len(names) < 64:

@@ -77,21 +77,22 @@ class Upright:
         """The four numbers that turn and mirror a stored picture into an upright one."""
         if self.turn is not None:
             angle = math.radians(self.turn)
-            turning = math.cos(angle), math.sin(angle), -math.sin(angle), math.cos(angle)
+            a, b = math.cos(angle), math.sin(angle)
+            c, d = -b, a
         elif data := frame.side_data.get("DISPLAYMATRIX"):
-            turning = tuple(int(x) for x in np.frombuffer(data, np.int32)[[0, 1, 3, 4]])
+            a, b, c, d = np.frombuffer(data, np.int32)[[0, 1, 3, 4]].tolist()
         else:
-            turning = 1, 0, 0, 1
-        a, b, c, d = turning
+            a, b, c, d = 1, 0, 0, 1
         why = "as the file asks" if self.turn is None else "as was asked"
         # A mirrored picture is mirrored first, left and right.
         mirrored = a * d < b * c
-        angle = round(math.degrees(math.atan2(-b, -a) if mirrored else math.atan2(b, a)) / 90) % 4
+        angle = math.atan2(-b, -a) if mirrored else math.atan2(b, a)
+        quarters = round(angle / (math.pi / 2)) % 4
         if mirrored:
             self._note(f"It was mirrored, {why}.")
-        if angle:
-            self._note(f"It was turned by {90 * angle} degrees clockwise, {why}.")
-        return turning
+        if quarters:
+            self._note(f"It was turned by {90 * quarters} degrees clockwise, {why}.")
+        return a, b, c, d
 
     def _size(self, lies):
         """Width and height to which a stored picture is shrunk."""

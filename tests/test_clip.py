@@ -5,11 +5,11 @@ import av
 import cv2
 import numpy as np
 import pytest
+from toy_clips import H, W, add, arm, encode, reach, room, shows
 
 from lbw_minimal import clip as clips
 from lbw_minimal.clip import read_clip, resample, steady
 from lbw_minimal.training import InputError
-from tests.toy_clips import H, W, add, arm, encode, reach, room, shows
 
 KINDS = {
     "h264.mp4": ("libx264", None, {}),

@@ -6,10 +6,10 @@ import time
 import av
 import pytest
 from PIL import Image
+from toy_clips import add, add_sound, encode, reach, room
 
 from lbw_minimal.clip import read_clip
 from lbw_minimal.training import InputError
-from tests.toy_clips import add, add_sound, encode, reach, room
 
 
 def write(path, data):
@@ -178,3 +178,11 @@ def test_sound_that_goes_on_does_not_make_a_film_cut_short(tmp_path):
         packets = add(out, reach(), "libx264") + add_sound(out, seconds=4)
         out.mux(sorted(packets, key=lambda p: p.dts * p.time_base))
     assert len(read_clip(tmp_path / "a.mkv").frames) == 30
+
+
+def test_recordings_put_one_after_another_go_on(tmp_path):
+    """Time stamps begin anew in the second one."""
+    write(tmp_path / "a.ts", 2 * film(tmp_path, "a.ts", "mpeg2video", n=60))
+    clip = read_clip(tmp_path / "a.ts")
+    assert len(clip.frames) >= 118 and clip.times[-1] == pytest.approx(4.8, abs=0.2)
+    assert clip.cuts == [60]

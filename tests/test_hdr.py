@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from toy_clips import encode
 
 from lbw_minimal import hdr
 from lbw_minimal.clip import read_clip
-from tests.toy_clips import encode
 
 
 @pytest.mark.parametrize(
