@@ -14,6 +14,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from av.video.reformatter import VideoReformatter
 
 from lbw_minimal import motion
 from lbw_minimal.decoding import AGAIN, Decoder, Stream, look
@@ -144,14 +145,16 @@ class _Film:
 
     def _by_key_frames(self):
         """Looks for the motion in a film too long for memory. The sentence of `_choose`, or ""."""
-        size = Upright(self.stream).bytes
-        if self.stream.seconds * RATE * size <= MOST:
+        if self.stream.seconds * RATE * Upright(self.stream).bytes <= MOST:
             return ""
+        scaler = VideoReformatter()
         stamps, frames, last = [], [], 0.0
         with self._bar("look through") as bar:
             for time, frame in Decoder(self.path, self.stream, sparse=True):
                 stamps.append(time)
-                tiny = frame.reformat(motion.SMALL, motion.SMALL, "rgb24", interpolation="AREA")
+                size = motion.SMALL, motion.SMALL
+                # One scaler for all: a frame that makes its own keeps its tables of 2 MB.
+                tiny = scaler.reformat(frame, *size, "rgb24", interpolation="AREA", threads=1)
                 frames.append(tiny.to_ndarray())
                 if time is not None:
                     bar.update(round((time - last) * self.stream.rate))

@@ -32,6 +32,7 @@ class Upright:
         self.stream, self.turn, self.window = stream, turn, window
         self.notes = list[str]()
         self._scaler = VideoReformatter()  # keeps its tables from frame to frame
+        self._matrix: tuple | None = None  # how the stream's pictures are turned
         self._white: float | None = None  # of HDR, the same for all frames
 
     @property
@@ -41,12 +42,11 @@ class Upright:
         return 3 * w * h
 
     def __call__(self, frame: av.VideoFrame) -> np.ndarray:
-        a, b, c, d = self._turning(frame)
+        # Once: a frame that was asked for its side data stays in memory, by a cycle.
+        self._matrix = a, b, c, d = self._matrix or self._turning(frame)
         lies = abs(b) > abs(a)
         size = self._size(lies)
-        how: dict[str, Any] = dict(
-            threads=1
-        )  # a thread costs more to start than so small a picture
+        how: dict[str, Any] = dict(threads=1)  # more cost time to start for so small a picture
         if size != (frame.width, frame.height):
             smaller = size[0] <= frame.width and size[1] <= frame.height
             how |= dict(width=size[0], height=size[1])
@@ -61,7 +61,7 @@ class Upright:
         if lies:
             rgb, a, d = rgb.transpose(1, 0, 2), c, b
         rgb = rgb[:: -1 if d < 0 else 1, :: -1 if a < 0 else 1]
-        return np.ascontiguousarray(self._inside(rgb))
+        return self._inside(rgb).copy()
 
     def _tone_mapped(self, frame, how):
         signal = self._scaler.reformat(frame, format="rgb48le", **how).to_ndarray()

@@ -1,6 +1,9 @@
 """People's clips: whatever wrote the file, what it shows comes out upright, squared, in ordinary
 colours and at its true time; what cannot be read gets one true sentence."""
 
+import subprocess
+import sys
+
 import av
 import cv2
 import numpy as np
@@ -265,6 +268,19 @@ def test_memory_does_not_grow_with_the_length(tmp_path, monkeypatch):
 def test_a_piece_can_be_asked_for(tmp_path):
     clip = read_clip(encode(tmp_path / "a.mp4", reach(100)), start=1.0, end=2.0)
     assert len(clip.frames) == 26 and shows(clip.frames, reach(100)[25:51]) < 8
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere the peak has other units")
+def test_4k_needs_little_memory(tmp_path):
+    """60 frames are 750 MB, if what was decoded is kept; torch alone takes 200."""
+    large = (cv2.resize(f, (3840, 2160), interpolation=cv2.INTER_NEAREST) for f in [reach(1)[0]])
+    path = encode(tmp_path / "a.mp4", [*large] * 60, options={"preset": "ultrafast"})
+    code = (
+        "import resource, sys; from lbw_minimal.clip import read_clip; read_clip(sys.argv[1]);"
+        "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)"
+    )
+    done = subprocess.run([sys.executable, "-c", code, path], capture_output=True, check=True)
+    assert int(done.stdout) < 600_000  # kB; measured 400,000
 
 
 def test_4k_is_shrunk_to_what_it_shows(tmp_path):
