@@ -26,7 +26,7 @@ import torch
 from lbw_minimal.training import InputError, write_atomic
 from tests.grade import feedback, sandbox
 from tests.grade.exercise import Exercise, everything
-from tests.grade.judge import Result, judge, nothing
+from tests.grade.judge import UNDONE, Result, best, judge, nothing
 from tests.grade.sandbox import Lost, Sandbox
 from tests.grade.submission import MOST, RELEASED, Answer, Unreadable, answer, read
 
@@ -187,15 +187,34 @@ def grade(entry: Path, ids: list[str], seed: int = SEED) -> tuple[list[Result], 
 
 
 def grade_one(exercise: Exercise, given: Answer, box: Sandbox, seed: int = 0) -> Result:
-    """The result of one answer, run in the sandbox."""
+    """The result of one answer, run in the sandbox; the best, where there are several."""
+    if given.open:
+        return nothing(exercise, UNDONE, open=True)
+    ways = [
+        (a, over) for a in (given, *given.others) for over in ((True, False) if a.own else (False,))
+    ]
+    return best(lambda a=a, over=over: in_sandbox(exercise, a, over, box, seed) for a, over in ways)
+
+
+def in_sandbox(exercise: Exercise, given: Answer, over: bool, box: Sandbox, seed: int) -> Result:
+    """The result of one cell. over: with the exercise's `given` in place of what the student wrote
+    by these names."""
+    how = {"over": over, "definitions_only": False}
+
+    def start():
+        box.close()
+        return box.open(exercise, given.source, given.helpers, given.below, **how)
 
     def renew():
-        box.close()
-        if box.open(exercise, given.source, given.helpers) is not None:
+        if start() is not None:
             raise Lost("the cell runs once, but not a second time")
 
     try:
-        failed = box.open(exercise, given.source, given.helpers)
+        try:
+            failed = start()
+        except Lost:  # the cells train for too long, or end their process
+            how["definitions_only"] = True
+            failed = start()
         if failed is not None:
             text = getattr(failed, "text", "")
             why = f"the cell does not run: {failed}: {text}" if text else f"{failed}"

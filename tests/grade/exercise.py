@@ -16,6 +16,7 @@ there.
 
 from __future__ import annotations
 
+import ast
 import importlib
 import inspect
 import pkgutil
@@ -27,8 +28,8 @@ import numpy as np
 import torch
 
 from tests.grade import exercises
+from tests.grade.cell.answer import PREAMBLE
 from tests.grade.cell.wire import Other, Raised, decode, encode
-from tests.grade.cell.worker import PREAMBLE
 
 TRIALS = 3  # random inputs a check
 
@@ -74,6 +75,12 @@ class Exercise:
     @property
     def points(self) -> float:
         return sum(check.points for check in self.checks)
+
+    @property
+    def gives(self) -> set[str]:
+        """Functions and classes among what is given."""
+        kinds = ast.FunctionDef | ast.ClassDef
+        return {node.name for node in ast.parse(self.given).body if isinstance(node, kinds)}
 
     @property
     def grade_id(self) -> str:
@@ -209,15 +216,24 @@ def _kind(x) -> str:
     return "nothing (None)" if x is None else f"a {type(x).__name__}"
 
 
+def _array(items):
+    """A list of numbers, or of lists of them, as an array; itself where it is none."""
+    try:
+        array = np.array(items)
+    except ValueError:
+        return items
+    return array if array.dtype.kind in "biufc" else items
+
+
 def _different_numbers(got, want, check):
+    if isinstance(got, list | tuple) and np.ndim(want):
+        got = _array(got)
     if not (isinstance(got, np.ndarray) or _is_number(got) or isinstance(got, bool)):
         return f"it returns {_kind(got)}; expected {_kind(want)}"
     got, want = np.asarray(got), np.asarray(want)
     if got.shape != want.shape:
         return f"it has shape {got.shape}; expected {want.shape}"
-    truth = [x.dtype.kind == "b" for x in (got, want)]
-    whole = [x.dtype.kind in "iu" for x in (got, want)]
-    if truth[0] != truth[1] or (whole[1] and not whole[0]):
+    if (got.dtype.kind == "b") != (want.dtype.kind == "b"):
         return f"its values are {got.dtype}; expected {want.dtype}"
     if not np.isfinite(got).all() and np.isfinite(want).all():
         return "it contains NaN or infinity"

@@ -7,6 +7,7 @@ else's (`call`): the notebook calls its own function, the grader a process it do
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -63,63 +64,93 @@ def nothing(exercise: Exercise, message: str, open: bool = False) -> Result:
     return Result(exercise.id, exercise.title, outcomes, open)
 
 
+def best(ways: Iterable[Callable[[], Result]]) -> Result:
+    """The best result of several ways to take an answer, the first where they are equal.
+
+    A way after one that earned every point is not tried.
+    """
+    found = None
+    for way in ways:
+        result = way()
+        if found is None or result.points > found.points:
+            found = result
+        if found.points == found.most:
+            break
+    return found
+
+
 def judge(exercise: Exercise, call, seed: int = 0, renew=None) -> Result:
     """Run all checks of an exercise on the answer behind call(args) -> (value, changed its inputs).
 
     renew() starts that answer afresh, as if it had never been called. A call that raises Lost ends
     the exercise: what was earned before stays. An answer that is the same for all inputs earns
     nothing, also where it happens to be right; nor does one that hangs on what it was asked before.
+    The order of the questions hangs on the seed, so that counting them helps nobody.
     """
-    reference = exercise.run(exercise.source)
-    mistakes = [(m.hint, exercise.run(exercise.wrong(m))) for m in exercise.mistakes]
-    result, lost, known = Result(exercise.id, exercise.title), "", []
-    answers, truths, guesses = [], [], []
-    for i, check in enumerate(exercise.checks):
-        rng = np.random.default_rng([seed, i])
-        message, hints = lost, []
-        for trial in range(check.trials):
-            if message:
-                break
-            args = check.inputs(rng)
-            try:
-                got, changed = call(args)
-            except Lost as e:
-                message = lost = str(e)
-                break
-            if type(got) is Raised and got in OPEN:
-                message = UNDONE
-                break
-            want = reference(args)
-            answers.append(got)
-            truths.append(want)
-            message = _message(check, got, want, args)
-            if message:
-                hints = [h for h, wrong in mistakes if _same(check, got, wrong(args), want)]
-            elif changed:
-                message = "it changes its inputs: work on a copy"
-            if trial == 0:
-                known.append((args, got))
+    checks, reference, known = exercise.checks, exercise.run(exercise.source), {}
+    wrong = [(m.hint, exercise.run(exercise.wrong(m))) for m in exercise.mistakes]
+    said, left, hints = [""] * len(checks), [c.trials for c in checks], [[] for _ in checks]
+    answers, truths, lost = [], [], ""
+    for i, args in _questions(exercise, seed):
+        if said[i]:
+            continue
+        try:
+            got, changed = call(args)
+        except Lost as e:
+            lost = str(e)
+            break
+        left[i] -= 1
+        if type(got) is Raised and got in OPEN:
+            said[i] = UNDONE
+            continue
+        want = reference(args)
+        answers.append(got)
+        truths.append(want)
+        known.setdefault(i, (args, got))
+        said[i] = _message(checks[i], got, want, args)
+        if said[i]:
+            hints[i] = [hint for hint, w in wrong if _same(checks[i], got, w(args), want)]
+        elif changed:
+            said[i] = "it changes its inputs: work on a copy"
+    if all(message == UNDONE for message in said):
+        return nothing(exercise, UNDONE, open=True)
+    result = Result(exercise.id, exercise.title)
+    for check, message, more in zip(checks, said, left, strict=True):
+        message = message or (lost if more else "")
         points = 0 if message else check.points
         result.outcomes.append(Outcome(check.label, points, check.points, message))
-        guesses.append(hints)
-    if all(o.message == UNDONE for o in result.outcomes):
-        return nothing(exercise, UNDONE, open=True)
-    # On some inputs two mistakes give the same answer: the one that explains most checks is it, if
-    # that is half of what went wrong. A mistake that explains less happens to give the same there.
-    votes = Counter(hint for hints in guesses for hint in set(hints))
-    wrong = sum(o.points == 0 and o.message not in (lost, UNDONE) for o in result.outcomes)
-    for outcome, hints in zip(result.outcomes, guesses, strict=True):
-        likely = [h for h in hints if 2 * votes[h] >= wrong]
-        outcome.message = max(likely, key=votes.get, default=outcome.message)
-    if any(o.points for o in result.outcomes) and not lost:
-        if _all_same(answers) and not _all_same(truths):
-            message = "it returns the same, whatever it is given"
-        else:
-            message = _repeat(known, call, renew)
+    _explain(result, hints, lost)
+    if result.points and not lost:
+        same = _all_same(answers) and not _all_same(truths)
+        message = SAME if same else _repeat(list(known.values()), call, renew)
         if message:
             for o in result.outcomes:
                 o.points, o.message = 0, o.message or message
     return result
+
+
+SAME = "it returns the same, whatever it is given"
+
+
+def _questions(exercise: Exercise, seed: int):
+    """(check, inputs) in an order that hangs on the seed."""
+    sources = [np.random.default_rng([seed, i]) for i in range(len(exercise.checks))]
+    order = np.repeat(np.arange(len(sources)), [c.trials for c in exercise.checks])
+    for i in np.random.default_rng([seed, len(sources)]).permutation(order):
+        yield int(i), exercise.checks[i].inputs(sources[i])
+
+
+def _explain(result: Result, hints: list[list[str]], lost: str) -> None:
+    """Put a hint in place of a message where an anticipated mistake explains it.
+
+    On some inputs two mistakes give the same answer: the one that explains most checks is it, if
+    that is half of what went wrong. A mistake that explains less happens to give the same there.
+    """
+    votes = Counter(hint for found in hints for hint in set(found))
+    wrong = sum(o.points == 0 and o.message not in (lost, UNDONE) for o in result.outcomes)
+    for outcome, found in zip(result.outcomes, hints, strict=True):
+        likely = [h for h in found if 2 * votes[h] >= wrong]
+        outcome.message = max(likely, key=votes.get, default=outcome.message)
 
 
 def _message(check: Check, got, want, args) -> str:

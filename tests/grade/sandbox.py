@@ -36,6 +36,7 @@ ENDED = (
     "(an endless loop?)"
 )
 START = 120  # s for the libraries to load on a busy machine
+LEAVING = 5  # s for a process that has lost its channel to end
 
 
 class Lost(Exception):
@@ -93,11 +94,14 @@ def command(fd: int) -> list[str]:
 
 
 class Sandbox:
-    """One worker process: `open` an exercise, `call` it, `close` it. When lost it starts again."""
+    """One worker process: `open` an exercise, `call` it, `close` it. When lost it starts again.
+
+    An exercise's process has a channel of its own. That it has ended says the worker, on
+    `control`, where no student's code can speak.
+    """
 
     def __init__(self):
-        self.process = self.channel = None
-        self.number = 0
+        self.process = self.control = self.channel = None
 
     def __enter__(self):
         return self
@@ -106,38 +110,48 @@ class Sandbox:
         self.kill()
 
     def start(self) -> None:
-        ours, theirs = socket.socketpair()
+        self.control, theirs = socket.socketpair()
         env = {"OMP_NUM_THREADS": "1", "PATH": os.environ.get("PATH", "")}
         self.process = subprocess.Popen(
             command(theirs.fileno()), pass_fds=[theirs.fileno()], stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True, env=env,
         )  # fmt: skip
         theirs.close()
-        self.channel = ours
         try:
-            if self._receive(START) != b"ready":
+            if self._receive(self.control, START) != b"ready":
                 raise Lost("the grading process spoke before its turn")
         except Lost as e:
             raise RuntimeError("the grading process does not start") from e
 
     def kill(self) -> None:
         """End the worker and all it has started."""
+        self._hang_up()
         if self.process:
             for pid in _descendants(self.process.pid):
                 _kill(pid)
             self.process.kill()
             self.process.wait()
-            self.channel.close()
-            self.process = self.channel = None
+            self.control.close()
+            self.process = self.control = None
 
-    def open(self, exercise: Exercise, source: str, helpers: list[str]) -> wire.Raised | None:
-        """Define `source`, an answer, after what it needs; what it raised, or None. Raises Lost."""
+    def open(
+        self, exercise: Exercise, source: str, helpers: list, below: list = (), **how: bool
+    ) -> wire.Raised | None:
+        """Define `source`, an answer, after what it needs; what it raised, or None. Raises Lost.
+
+        helpers, below: see `Answer`. how: over and definitions_only, see `define`.
+        """
         if not self.process:
             self.start()
-        self.number += 1
-        job = {"source": source, "helpers": helpers, "name": exercise.name, "given": exercise.given}
-        limits = {"memory": MEMORY, "cpu": CPU}
-        self._send(wire.encode(job | {"probe": exercise.probe, "number": self.number} | limits))
+        job = {"source": source, "helpers": list(helpers), "below": list(below)}
+        job |= {"name": exercise.name, "given": exercise.given, "probe": exercise.probe}
+        job |= {"memory": MEMORY, "cpu": CPU, "over": False, "definitions_only": False} | how
+        try:
+            wire.send(self.control, wire.encode(job))
+            _, (fd,), _, _ = socket.recv_fds(self.control, 1, 1)
+        except (OSError, ValueError):
+            raise self._lost(ENDED) from None
+        self.channel = socket.socket(fileno=fd)
         failed = self._answer()
         if type(failed) is str:  # before the student's first line
             raise RuntimeError(failed)
@@ -145,7 +159,11 @@ class Sandbox:
 
     def call(self, args: tuple):
         """(what the probe returned or raised, whether it changed its arguments). Raises Lost."""
-        self._send(wire.encode(args))
+        try:
+            self.channel.settimeout(WALL)
+            wire.send(self.channel, wire.encode(args))
+        except OSError:
+            raise self._lost(ENDED) from None
         answer = self._answer()
         if type(answer) is not list or len(answer) != 2:
             raise self._lost("it sent something else than an answer")
@@ -153,45 +171,37 @@ class Sandbox:
 
     def close(self) -> None:
         """Leave the exercise; its process ends."""
-        if self.process:
+        if self.channel:
+            self._hang_up()
             try:
-                self._send(b"")
-                if self._answer(leaving=True) != "left":
-                    self.kill()
+                self._receive(self.control, LEAVING)
             except Lost:
                 self.kill()
+
+    def _hang_up(self) -> None:
+        if self.channel:
+            self.channel.close()
+            self.channel = None
 
     def _lost(self, why: str) -> Lost:
         self.kill()
         return Lost(why)
 
-    def _send(self, data: bytes) -> None:
+    def _answer(self):
         try:
-            self.channel.settimeout(WALL)
-            wire.send(self.channel, data)
-        except OSError:
-            raise self._lost(ENDED) from None
-
-    def _answer(self, leaving: bool = False):
-        data = self._receive(WALL)
-        if data[8:] == wire.encode("left") and not leaving:
-            raise self._lost(ENDED)
-        if len(data) < 8 or struct.unpack_from("<Q", data)[0] != self.number:
-            raise self._lost("it sent something else than an answer")
-        try:
-            return wire.decode(data[8:])
+            return wire.decode(self._receive(self.channel, WALL))
         except wire.Garbage:
             raise self._lost("it sent something else than an answer") from None
 
-    def _receive(self, seconds: float) -> bytes:
+    def _receive(self, channel, seconds: float) -> bytes:
         """One message within the time."""
         deadline, data, want = time.monotonic() + seconds, bytearray(), 8
         while len(data) < want:
             left = deadline - time.monotonic()
-            if left <= 0 or not select.select([self.channel], [], [], left)[0]:
+            if left <= 0 or not select.select([channel], [], [], left)[0]:
                 raise self._lost(f"no answer within {seconds:g} s: does a loop never end?")
             try:
-                part = self.channel.recv(min(want - len(data), 1 << 20))
+                part = channel.recv(min(want - len(data), 1 << 20))
             except OSError:
                 part = b""
             if not part:

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import ast
-import builtins
+import functools
 import json
 import re
-import symtable
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
+from tests.grade.cell.answer import STUB, bound, is_stub
 from tests.grade.exercise import Exercise, everything
 
 MOST = 20 << 20  # bytes of a notebook; those of the course have 0.1 MB
-STUB = 'raise NotImplementedError("your lines here")'
 RELEASED = Path(__file__).resolve().parents[2] / "notebooks"
-LIBRARIES = {"math", "np", "torch", "F", "nn"}  # what every exercise may use
 
 
 class Unreadable(Exception):
@@ -27,18 +25,21 @@ class Unreadable(Exception):
 class Cell:
     """A code cell.
 
-    exercise: the id of the one it is marked for, by grade id or its first line; or "". body: its
-    top-level statements, but for functions and classes as they were handed out; none if it does not
-    parse. defines: the names these define.
+    exercise: the id of the one it is marked for, by grade id or its first line; or "". course:
+    whether it stands in the released notebooks as it is. defines: the names that its top-level
+    statements bind, but for functions and classes as they were handed out. checks: the ids of the
+    exercises it checks. Both are empty if it does not parse.
     """
 
     source: str
     exercise: str
+    course: bool = False
 
     def __post_init__(self):
         tree = _parse(self.source)
-        self.body = [node for node in (tree.body if tree else []) if not _is_stub(node)]
-        self.defines = set().union(*map(_defined, self.body))
+        body = [node for node in (tree.body if tree else []) if not is_stub(node)]
+        self.defines = set().union(*map(bound, body))
+        self.checks = set().union(*map(_checked, body))
 
 
 @dataclass
@@ -66,10 +67,21 @@ def read(path: Path) -> Notebook:
         )
     try:
         found = json.loads(path.read_bytes().decode("utf-8-sig"))["cells"]
-        code = [(c, _plain(c["source"])) for c in found if c["cell_type"] == "code"]
-        return Notebook(path.name, [Cell(source, _marked(c, source)) for c, source in code])
+        return Notebook(path.name, [cell for c in found if (cell := _cell(c))])
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as e:
         raise Unreadable(f"no Jupyter notebook ({type(e).__name__})") from None
+
+
+def _cell(cell) -> Cell | None:
+    """A code cell; None if it is of another kind, or damaged."""
+    try:
+        if cell["cell_type"] != "code":
+            return None
+        text = cell["source"] if isinstance(cell["source"], str) else "".join(cell["source"])
+        source = _plain(text)
+        return Cell(source, _marked(cell, source), text.strip() in _released())
+    except (KeyError, TypeError, AttributeError):
+        return None
 
 
 def _marked(cell, source: str) -> str:
@@ -82,9 +94,8 @@ def _marked(cell, source: str) -> str:
     return next((id for id, e in known.items() if e.grade_id == grade_id), by_title)
 
 
-def _plain(source) -> str:
+def _plain(text: str) -> str:
     """Cell source as Python: IPython's own lines (%magic, !shell, name?) become calls to it."""
-    text = source if isinstance(source, str) else "".join(source)
     text = re.sub(r"\A\s*%%.*\n", "", text)  # such as %%time, above a cell that is Python
     if _parse(text):
         return text
@@ -105,115 +116,98 @@ def _parse(source: str) -> ast.Module | None:
         return None
 
 
-def _is_stub(node) -> bool:
-    """Whether a body in a function or class has nothing but the line that was handed out."""
-    bodies = [n.body for n in ast.walk(node) if isinstance(n, ast.FunctionDef)]
-    stub = ast.unparse(ast.parse(STUB))
-    return any(ast.unparse(body[-1]) == stub and _bare(body) for body in bodies)
+def _checked(node) -> set[str]:
+    """Ids that a statement calls `check` with."""
+    calls = (n for n in ast.walk(node) if isinstance(n, ast.Call) and n.args)
+    named = (n.args[0] for n in calls if isinstance(n.func, ast.Name) and n.func.id == "check")
+    return {a.value for a in named if isinstance(a, ast.Constant) and isinstance(a.value, str)}
 
 
-def _bare(body) -> bool:
-    """Whether a body has one statement, beside its docstring."""
-    return len(body) == 1 or (len(body) == 2 and isinstance(body[0], ast.Expr))
-
-
-def _defined(node) -> set[str]:
-    """Names that a top-level statement defines, if it only defines; "*" if nobody knows which."""
-    if isinstance(node, ast.FunctionDef | ast.ClassDef):
-        return {node.name}
-    if isinstance(node, ast.Import | ast.ImportFrom):
-        return {(alias.asname or alias.name).split(".")[0] for alias in node.names}
-    if isinstance(node, ast.Assign | ast.AnnAssign) and node.value and not _busy(node.value):
-        targets = getattr(node, "targets", None) or [node.target]
-        names = [t.elts if isinstance(t, ast.Tuple | ast.List) else [t] for t in targets]
-        flat = [t for some in names for t in some]
-        return {t.id for t in flat} if all(isinstance(t, ast.Name) for t in flat) else set()
-    return set()
-
-
-def _busy(value) -> bool:
-    """Whether an expression calls anything but Python and the libraries; a lambda calls nothing."""
-    if isinstance(value, ast.Lambda):
-        return False
-    if isinstance(value, ast.Await):
-        return True
-    if isinstance(value, ast.Call):
-        root = value.func
-        while isinstance(root, ast.Attribute):
-            root = root.value
-        if not isinstance(root, ast.Name) or root.id not in LIBRARIES | set(dir(builtins)):
-            return True
-    return any(map(_busy, ast.iter_child_nodes(value)))
+@functools.cache
+def _released() -> set[str]:
+    """The code cells of the course's notebooks, but for those of the exercises."""
+    found = set()
+    for path in RELEASED.glob("*.ipynb"):
+        for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]:
+            text = "".join(cell["source"]).strip()
+            if cell["cell_type"] == "code" and not _marked(cell, text):
+                found.add(text)
+    return found
 
 
 @dataclass
 class Answer:
-    """The cell that answers an exercise, what it uses of other cells, and where it stands."""
+    """The cell that answers an exercise, and those around it, in the notebook's order.
+
+    helpers, above it, and below: (source, whether only its definitions matter, since it is one of
+    the course's). own: whether the student has written what the exercise may rely on (its `given`),
+    too. others: further cells of the notebook that answer it.
+    """
 
     source: str
-    helpers: list[str]
+    helpers: list[tuple[str, bool]]
     where: str
     elsewhere: str = ""  # another notebook of the submission that answers the exercise, too
+    below: list[tuple[str, bool]] = field(default_factory=list)
+    own: bool = False
+    open: bool = False  # nothing but what was handed out
+    others: list[Answer] = field(default_factory=list)
 
 
 def answer(exercise: Exercise, books: list[Notebook]) -> Answer | None:
     """What answers an exercise in the notebooks of a submission; None if there is nothing.
 
-    A cell marked for it that defines its name with more than the stub; else another cell that does,
-    in a notebook of the exercise's number; else a cell marked for it. Of several the last counts,
-    and of several notebooks the one that is called as it was released.
+    A cell counts that binds its name by more than the stub: marked for it, or in a notebook of the
+    exercise's number. Else a cell marked for it. Of several notebooks counts the one that is
+    called as it was released.
     """
     number = exercise.id.split(".")[0]
     books = sorted(books, key=lambda book: (RELEASED / book.name).is_file())
-    cells = [(book, i, cell) for book in books for i, cell in enumerate(book.cells)]
-    marked = [place for place in cells if place[2].exercise == exercise.id]
-    others = [place for place in cells if not place[2].exercise and place[0].number == number]
-    done = [place for place in marked if exercise.name in place[2].defines]
-    found = done or [place for place in others if exercise.name in place[2].defines] or marked
+    found = []
+    for book in books:
+        places = [
+            i
+            for i, cell in enumerate(book.cells)
+            if exercise.name in cell.defines and not cell.course
+            and (cell.exercise == exercise.id or book.number == number)
+        ]  # fmt: skip
+        if places:
+            found.append((book, _by_rank(exercise, book, places)))
     if not found:
-        return None
-    book, i, cell = found[-1]
-    rest = [b.name for b, _, c in found if b is not book and c.source != cell.source]
-    helpers = _helpers(book.cells, i, exercise)
-    return Answer(cell.source, helpers, book.name, rest[-1] if rest else "")
+        return _untouched(exercise, books)
+    book, places = found[-1]
+    best, *others = [_around(exercise, book, i) for i in places]
+    best.others = others
+    sources = [(b.name, b.cells[p[0]].source) for b, p in found[:-1]]
+    best.elsewhere = next((name for name, text in sources if text != best.source), "")
+    return best
 
 
-def _helpers(cells: list[Cell], own: int, exercise: Exercise) -> list[str]:
-    """Imports, functions and constants of other cells that cell `own` uses, in notebook order.
+def _by_rank(exercise: Exercise, book: Notebook, places: list[int]) -> list[int]:
+    """Which of several cells that bind an exercise's name to grade, the likeliest first.
 
-    Of several definitions of a name the last above the cell counts, else the first below.
+    What stands when the notebook comes to its last check of the exercise; the marked cell; what
+    stands at the notebook's end.
     """
-    source = cells[own].source
-    known = set(dir(builtins)) | LIBRARIES
-    for text in (exercise.given, source):
-        known |= {name for node in getattr(_parse(text), "body", []) for name in _defined(node)}
-    offers = []  # (cell, names, text)
-    for i, cell in enumerate(cells):
-        offers += [(i, _defined(n), ast.unparse(n)) for n in cell.body if i != own]
-    wanted = _names(source) - known
-    taken = {k for k, (_, names, _) in enumerate(offers) if "*" in names}
-    while wanted:
-        name = wanted.pop()
-        known.add(name)
-        places = [k for k, (_, names, _) in enumerate(offers) if name in names]
-        above = [k for k in places if offers[k][0] < own]
-        for k in [*above[-1:], *places][:1]:
-            taken.add(k)
-            wanted |= _names(offers[k][2]) - known
-    return [offers[k][2] for k in sorted(taken)]
+    checks = [i for i, cell in enumerate(book.cells) if exercise.id in cell.checks]
+    before = [i for i in places if checks and i <= checks[-1]]
+    marked = [i for i in places if book.cells[i].exercise == exercise.id]
+    return list(dict.fromkeys([*before[-1:], *marked[-1:], places[-1]]))
 
 
-def _names(source: str) -> set[str]:
-    """Names that `source` takes from outside."""
-    try:
-        tables = [symtable.symtable(source, "cell", "exec")]
-    except (SyntaxError, ValueError, RecursionError, MemoryError):
-        return set()
-    found = set()
-    for table in tables:
-        tables += table.get_children()
-        for name in table.get_symbols():
-            outside = name.is_global() if table.get_type() != "module" else not name.is_assigned()
-            if name.is_referenced() and outside:
-                found.add(name.get_name())
+def _untouched(exercise: Exercise, books: list[Notebook]) -> Answer | None:
+    """The cell marked for an exercise where none defines its name."""
+    cells = [(b, i) for b in books for i, c in enumerate(b.cells) if c.exercise == exercise.id]
+    if not cells:
+        return None
+    found = _around(exercise, *cells[-1])
+    tree = _parse(found.source)
+    found.open = bool(tree) and any(map(is_stub, tree.body))
     return found
+
+
+def _around(exercise: Exercise, book: Notebook, own: int) -> Answer:
+    cells = [(cell.source, cell.course) for cell in book.cells]
+    given = exercise.gives & set().union(*(c.defines for c in book.cells if not c.course))
+    helpers, below = cells[:own], cells[own + 1 :]
+    return Answer(cells[own][0], helpers, book.name, below=below, own=bool(given))

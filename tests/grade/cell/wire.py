@@ -1,13 +1,16 @@
 """Values as bytes, between the judge and the process where a student's code runs.
 
-Numbers, strings, None, lists, tuples, dicts, numpy arrays and torch tensors pass; anything else
-arrives as `Other`, its type's name. Nothing is unpickled: bytes from a hostile process become plain
+Numbers, strings, None, lists, tuples, dicts, numpy arrays and torch tensors pass, and what is one of
+these by another name; anything else arrives as `Other`, its type's name. Nothing is unpickled: bytes from a hostile process become plain
 values or `Garbage`.
 """
 
 import json
 import math
 import struct
+from collections import deque
+from decimal import Decimal
+from fractions import Fraction
 
 import numpy as np
 
@@ -38,6 +41,14 @@ class Raised(str):
         return self
 
 
+def as_numbers(x: np.ndarray) -> np.ndarray:
+    """An array of objects as one of numbers, if they are."""
+    try:
+        return x.astype(float)
+    except (TypeError, ValueError, OverflowError):
+        return x
+
+
 def encode(value) -> bytes:
     """Header (JSON) and buffers (raw) of a value."""
     buffers = []
@@ -46,25 +57,37 @@ def encode(value) -> bytes:
         if deep > DEEPEST:
             return {"other": "a list of lists without end"}
         kind = type(x)
-        if x is None or kind in (bool, str):
+        if x is None or kind is bool:
             return {"v": x}
-        if kind is int:
-            return {"int": str(x)} if abs(x) < LARGEST else {"other": "a huge int"}
+        if isinstance(x, str) and kind is not Other and kind is not Raised:
+            return {"v": str.__str__(x)}  # of np.str_ and the like, too
+        if kind is int or (isinstance(x, int) and not isinstance(x, np.generic)):
+            return {"int": str(int(x))} if abs(x) < LARGEST else {"other": "a huge int"}
+        if isinstance(x, Fraction | Decimal):
+            x, kind = float(x), float
         if kind is float:
             return {"float": x.hex() if math.isfinite(x) else repr(x)}
-        if kind in (list, tuple):
-            return {kind.__name__: [pack(item, deep + 1) for item in x]}
-        if kind is dict:
-            return {"dict": [[pack(k, deep + 1), pack(v, deep + 1)] for k, v in x.items()]}
+        if isinstance(x, tuple):  # a namedtuple, too
+            return {"tuple": [pack(item, deep + 1) for item in tuple(x)]}
+        if isinstance(x, list | range | deque):
+            return {"list": [pack(item, deep + 1) for item in list(x)]}
+        if isinstance(x, dict):
+            return {"dict": [[pack(k, deep + 1), pack(v, deep + 1)] for k, v in dict(x).items()]}
         if kind is Raised:
             return {"raised": str(x), "text": x.text}
+        if kind is Other:
+            return {"other": str(x)}
         tensor = kind.__module__.split(".")[0] == "torch" and hasattr(x, "detach")
         if tensor:
             if x.device.type != "cpu":
                 return {"other": f"a tensor on {x.device}"}
-            x = x.detach().numpy()
+            x = x.detach().resolve_conj().resolve_neg().numpy()
         if isinstance(x, np.generic):
             x, tensor = np.asarray(x), "scalar"
+        if hasattr(x, "__array__") and type(x) is not np.ndarray and not isinstance(x, type):
+            x = np.asarray(x)  # another library's array
+        if type(x) is np.ndarray and x.dtype == object:
+            x = as_numbers(x)
         if type(x) is np.ndarray and x.dtype.str[1:] in DTYPES:
             # A fresh contiguous copy, so that views and odd strides pass.
             x = np.array(x, order="C", dtype=x.dtype.newbyteorder("="))

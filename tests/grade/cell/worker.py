@@ -5,7 +5,6 @@ imports the slow libraries once, and forks for every exercise; the fork confines
 runs a line of the student's.
 """
 
-import ast
 import contextlib
 import ctypes
 import io
@@ -17,24 +16,8 @@ import sys
 
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 
+import answer
 import wire
-
-PREAMBLE = """
-import math
-import numpy as np
-import torch
-import torch.nn.functional as F
-from torch import nn
-"""
-FORBIDDEN = ("lbw_minimal", "tasks", "solutions", "tests")
-
-
-class Hidden:
-    """Import hook: the package that holds the answers is not here."""
-
-    def find_spec(self, name, path=None, target=None):
-        if name.split(".")[0] in FORBIDDEN:
-            raise ImportError(f"{name} is not here: an exercise is answered by your own lines")
 
 
 def confine(memory: int, cpu: int, readable: list[str]) -> None:
@@ -157,114 +140,80 @@ def filter_calls() -> None:
     _prctl(22, 2, header)  # PR_SET_SECCOMP, SECCOMP_MODE_FILTER
 
 
-class Shell:
-    """What a notebook's cells may call beside Python; here it does nothing."""
-
-    def __getattr__(self, name):
-        return lambda *args, **kwargs: None
-
-
-def define(job: dict) -> tuple[dict, Exception | None]:
-    """The names a student's code defines. Raises what it raises.
-
-    A cell that fails may do so in a line beside the answer, such as a plot or a print of the
-    notebook's own variables: then its definitions are run alone, and what it raised is returned.
-    """
-    failed = None
-    space = {"__name__": "__main__", "get_ipython": Shell, "display": print, "check": Shell().check}
-    exec(compile(PREAMBLE + job["given"], "given", "exec"), space)
-    for helper in job["helpers"]:
-        with contextlib.suppress(Exception):  # where the answer needs it, the answer fails
-            exec(compile(helper, "another cell", "exec"), space)
-    try:
-        exec(compile(job["source"], "your cell", "exec"), space)
-    except Exception as e:
-        failed = e
-        space.pop(job["name"], None)
-        kinds = ast.FunctionDef | ast.ClassDef | ast.Import | ast.ImportFrom
-        kinds |= ast.Assign | ast.AnnAssign
-        for node in ast.parse(job["source"], "your cell").body:
-            with contextlib.suppress(Exception):
-                if isinstance(node, kinds):
-                    exec(compile(ast.Module([node], []), "your cell", "exec"), space)
-        if job["name"] not in space:
-            raise
-    return space, failed
-
-
-def run(job: dict, answer) -> None:
+def run(job: dict, channel) -> None:
     """Define the student's names and call the probe on every input the judge sends."""
+
+    def say(value):
+        wire.send(channel, wire.encode(value))
+
     try:
-        space, failed = define(job)
-        exec(compile(job["probe"], "the check", "exec"), space)
+        cells = answer.define(job)
+        exec(compile(job["probe"], "the check", "exec"), cells.names)
     except BaseException as e:
-        answer(wire.Raised(type(e).__name__, str(e)[:1000]))
-        answer.next()  # the judge hangs up
+        say(wire.Raised(type(e).__name__, str(e)[:1000]))
         return
-    answer(None)
-    import torch
-
-    while (request := answer.next()) is not None:
-        args = wire.decode(request, torch.from_numpy)
+    say(None)
+    below = job["below"]
+    while True:
         try:
-            torch.manual_seed(0)
-            value = space["probe"](*args)
-            changed = wire.encode(args) != request
-        except BaseException as e:
-            if isinstance(e, NameError) and isinstance(failed, ImportError):
-                e = failed  # what is missing was to be imported
-            text = str(e)[:1000]
-            if isinstance(e, NameError) and failed:
-                text += f" (the cell had failed: {type(failed).__name__}: {str(failed)[:200]})"
-            value, changed = wire.Raised(type(e).__name__, text), False
-        answer([value, changed])
-
-
-class Answer:
-    """The way back to the judge; every message carries the judge's number of the exercise."""
-
-    def __init__(self, channel, number):
-        self.channel, self.number = channel, number
-
-    def __call__(self, value) -> None:
-        wire.send(self.channel, struct.pack("<Q", self.number) + wire.encode(value))
-
-    def next(self) -> bytes | None:
-        data = wire.receive(self.channel)
-        return data or None
+            request = wire.receive(channel)
+        except EOFError:  # the judge has hung up
+            return
+        value, changed, e = answer.ask(cells.names["probe"], request, BaseException)
+        if below and isinstance(e, NameError | AttributeError):
+            cells.fill(below)
+            below = []
+            value, changed, e = answer.ask(cells.names["probe"], request, BaseException)
+        if e is not None:
+            value = answer.explained(value, e, cells.why)
+        say([value, changed])
 
 
 def main(fd: int, readable: list[str]) -> None:
-    """Serve exercises until the judge hangs up. readable: paths that a student's code may read."""
-    channel = socket.socket(fileno=fd)
-    space = {}
-    exec(PREAMBLE, space)
+    """Serve exercises until the judge hangs up. readable: paths that a student's code may read.
+
+    For each it forks a process with a channel of its own, whose other end goes to the judge; on
+    `control`, which that process does not have, it says when that process has ended.
+    """
+    control = socket.socket(fileno=fd)
+    exec(answer.PREAMBLE, space := {})
     import gymnasium  # noqa: F401 (imported before the fork, for speed)
     import pybullet  # noqa: F401
 
     space["torch"].set_num_threads(1)
-    sys.meta_path.insert(0, Hidden())
-    wire.send(channel, b"ready")
+    sys.meta_path[:0] = [answer.Hidden(), answer.Drawing()]
+    wire.send(control, b"ready")
     while True:
         try:
-            job = wire.decode(wire.receive(channel))
+            job = wire.decode(wire.receive(control))
         except EOFError:
             return
+        theirs, ours = socket.socketpair()
+        socket.send_fds(control, [b"."], [theirs.fileno()])
         pid = os.fork()
         if pid == 0:
-            try:
-                os.chdir("/")
-                sys.stdin = io.StringIO()
-                confine(job["memory"], job["cpu"], readable)
-            except BaseException as e:  # never run a stranger's code unconfined
-                Answer(channel, job["number"])(f"unconfined: {e}")
-                os._exit(1)
-            try:
-                run(job, Answer(channel, job["number"]))
-            finally:
-                os._exit(0)
+            control.close()
+            theirs.close()
+            serve(job, ours, readable)
+        theirs.close()
+        ours.close()
         os.waitpid(pid, 0)
-        wire.send(channel, struct.pack("<Q", job["number"]) + wire.encode("left"))
+        wire.send(control, b"ended")
+
+
+def serve(job: dict, channel, readable: list[str]) -> None:
+    """One exercise, in a process of its own. Never returns."""
+    try:
+        os.chdir("/")
+        sys.stdin = io.StringIO()
+        confine(job["memory"], job["cpu"], readable)
+    except BaseException as e:  # never run a stranger's code unconfined
+        wire.send(channel, wire.encode(f"unconfined: {e}"))
+        os._exit(1)
+    try:
+        run(job, channel)
+    finally:
+        os._exit(0)
 
 
 if __name__ == "__main__":
