@@ -14,6 +14,7 @@ import csv
 import hashlib
 import io
 import json
+import math
 import re
 import sys
 import traceback
@@ -186,10 +187,17 @@ def grade(entry: Path, ids: list[str], seed: int = SEED) -> tuple[list[Result], 
     return results, notes
 
 
-def grade_one(exercise: Exercise, given: Answer, box: Sandbox, seed: int = 0) -> Result:
-    """The result of one answer, run in the sandbox; the best, where there are several."""
+def grade_one(
+    exercise: Exercise, given: Answer, box: Sandbox, seed: int = 0, seconds: float = math.inf
+) -> Result:
+    """The result of one answer, run in the sandbox; the best, where there are several.
+
+    seconds: what is left for the submission.
+    """
     if given.open:
         return nothing(exercise, UNDONE, open=True)
+    box.start()
+    box.allow(min(sandbox.EXERCISE, seconds))
     ways = [
         (a, over) for a in (given, *given.others) for over in ((True, False) if a.own else (False,))
     ]

@@ -15,6 +15,7 @@ from fractions import Fraction
 import numpy as np
 
 MOST = 64 << 20  # bytes of one message
+ANSWER = 4 << 20  # bytes of an answer; the longest right one has 6,000
 DEEPEST = 20  # levels of lists in lists
 LARGEST = 1 << 63  # ints from here on are no numbers to numpy
 DTYPES = {
@@ -22,6 +23,7 @@ DTYPES = {
     for kind, sizes in {"f": (2, 4, 8), "i": (1, 2, 4, 8), "u": (1, 2, 4, 8)}.items()
     for size in sizes
 } | {"b1", "c8", "c16"}
+KEYS = (str, int, bool, type(None))  # of a dict; numbers of other kinds can share one hash
 
 
 class Garbage(ValueError):
@@ -128,16 +130,17 @@ def decode(data: bytes, tensor=None):
             if "tuple" in x:
                 return tuple(unpack(item, deep + 1) for item in x["tuple"])
             if "dict" in x:
-                return {unpack(k, deep + 1): unpack(v, deep + 1) for k, v in x["dict"]}
+                pairs = [(unpack(k, deep + 1), unpack(v, deep + 1)) for k, v in x["dict"]]
+                return {k if type(k) in KEYS else Other(type(k).__name__): v for k, v in pairs}
             if "raised" in x:
-                return Raised(str(x["raised"])[:100], str(x["text"])[:1000])
+                return Raised(_text(x["raised"], 100), _text(x["text"], 1000))
             if "array" in x:
-                sizes = all(type(k) is int and k >= 0 for k in x["shape"])
-                if x["array"] not in DTYPES or not sizes:
+                sizes = all(type(k) is int and 0 <= k < LARGEST for k in x["shape"])
+                if len(x["shape"]) > 8 or x["array"] not in DTYPES or not sizes:
                     raise Garbage("no such array")
                 dtype = np.dtype(x["array"])
                 size = math.prod(x["shape"]) * dtype.itemsize
-                if len(x["shape"]) > 8 or place + size > len(data):
+                if place + size > len(data):
                     raise Garbage("an array longer than its bytes")
                 flat = np.frombuffer(data, dtype, math.prod(x["shape"]), place)
                 array = flat.reshape(x["shape"]).copy()
@@ -145,7 +148,7 @@ def decode(data: bytes, tensor=None):
                 if x["kind"] == "scalar" and array.ndim == 0:
                     return array[()]
                 return tensor(array) if x["kind"] is True and tensor else array
-            return Other(str(x["other"])[:100])
+            return Other(_text(x["other"], 100))
 
         return unpack(header, 0)
     except Garbage:
@@ -160,6 +163,11 @@ def decode(data: bytes, tensor=None):
         OverflowError,
     ) as e:
         raise Garbage(str(e)) from None
+
+
+def _text(x, most: int) -> str:
+    """Text that can be written; a lone surrogate cannot."""
+    return str(x)[:most].encode(errors="backslashreplace").decode()
 
 
 def send(channel, data: bytes) -> None:
