@@ -29,7 +29,7 @@ from nbgrader.preprocessors import (
 from traitlets.config import Config
 
 from lbw_minimal.training import write_atomic
-from tests.grade.submission import STUB
+from tests.grade.cell.answer import STUB
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent

@@ -19,8 +19,7 @@ from tasks.__main__ import main
 from tasks.commands import batch, cluster, table
 from tests.grade import sandbox
 from tests.grade.__main__ import main as grade
-from tests.grade.cluster import grade_here, pack, unpack
-from tests.grade.submission import MOST
+from tests.grade.cluster import grade_here
 
 ROOT = Path(__file__).resolve().parents[1]
 SOLVED = json.loads((ROOT / "solutions" / "06_reward.ipynb").read_text())
@@ -260,7 +259,7 @@ def test_a_sandbox_that_does_not_hold_is_found(monkeypatch):
 def test_a_node_without_a_sandbox_does_not_grade(monkeypatch):
     monkeypatch.setattr(sandbox, "failing", lambda: "its sandbox does not start")
     with pytest.raises(cluster.Refused, match="its sandbox does not start"):
-        grade_here([], "", ["6.1"], 2)
+        grade_here([], [], "", ["6.1"], 2, False)
 
 
 # Grading
@@ -305,17 +304,3 @@ def test_grades_of_a_cluster_are_those_of_one_machine(nodes, tmp_path, monkeypat
     with pytest.raises(KeyError):  # nothing came back
         grade([*every, str(tmp_path / "there"), "--ray"])
     assert [entry.name for entry, _ in sent] == ["gus"]
-
-
-def test_a_submission_arrives_as_it_was_but_for_what_is_too_large_to_be_read(tmp_path):
-    entry = tmp_path / "ann"
-    (entry / "week 1").mkdir(parents=True)
-    small, large = entry / "week 1" / "a.ipynb", entry / "b.ipynb"
-    small.write_bytes(b"{}")
-    large.touch()
-    os.truncate(large, MOST + 1)
-    packed = pack([large, small], entry)
-    assert sum(len(data) for _, _, data in packed) == 2
-    unpack(packed, tmp_path / "there")
-    assert (tmp_path / "there" / "week 1" / "a.ipynb").read_bytes() == b"{}"
-    assert (tmp_path / "there" / "b.ipynb").stat().st_size == MOST + 1

@@ -23,10 +23,11 @@ import pytest
 import tests.grade.__main__ as grading
 from tests.grade import sandbox
 from tests.grade.__main__ import main, safe
-from tests.grade.cell.worker import has_landlock
+from tests.grade.cell.answer import STUB
+from tests.grade.cell.walls import has_landlock
 from tests.grade.exercise import find
 from tests.grade.sandbox import Sandbox
-from tests.grade.submission import STUB, Answer
+from tests.grade.submission import Answer
 
 ROOT = Path(__file__).resolve().parent.parent
 SOURCE = ROOT / "solutions" / "06_reward.ipynb"
@@ -465,14 +466,14 @@ def test_one_submission_is_a_job_of_its_own(tmp_path):
 
 
 def test_what_breaks_the_grader_costs_one_submission_and_is_told(tmp_path, monkeypatch, capsys):
-    for name in ("ann", "bob"):
-        write(tmp_path / "class", name, SOLVED)
+    write(tmp_path / "class", "ann", answered("# a bug"))
+    write(tmp_path / "class", "bob", SOLVED)
     right = grading.grade
 
-    def breaks(entry, ids, seed):
-        if entry.name == "ann":
+    def breaks(files, ids, seed, box):
+        if b"a bug" in files[0].data:
             raise RuntimeError("a bug of ours")
-        return right(entry, ids, seed)
+        return right(files, ids, seed, box)
 
     monkeypatch.setattr(grading, "grade", breaks)
     assert main([str(tmp_path / "class"), "--out", str(tmp_path / "out")]) == 1

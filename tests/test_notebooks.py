@@ -11,9 +11,10 @@ import pytest
 
 from solutions.__main__ import MATH, NOTEBOOKS, ROOT, contents, page, sources, student
 from tests.grade.__main__ import grade, main
+from tests.grade.cell.answer import STUB
 from tests.grade.exercise import everything
+from tests.grade.handed_in import Submission
 from tests.grade.notebook import StillOpen
-from tests.grade.submission import STUB
 
 ALL = everything()
 SOURCES = sources()
@@ -118,14 +119,14 @@ def test_the_student_version_stops_at_its_first_exercise_with_one_sentence(path)
 
 
 def test_the_solutions_earn_every_point_in_the_sandbox():
-    results, notes = grade(ROOT / "solutions", list(ALL))
+    results, notes = grade(Submission.of(ROOT / "solutions").files()[0], list(ALL))
     assert not notes
     wrong = [(r.id, r.lines()) for r in results if r.points < r.most]
     assert not wrong
 
 
 def test_untouched_student_notebooks_earn_nothing(tmp_path):
-    results, notes = grade(NOTEBOOKS, list(ALL))
+    results, notes = grade(Submission.of(NOTEBOOKS).files()[0], list(ALL))
     assert not notes
     assert [r.points for r in results] == [0] * len(ALL) and all(r.open for r in results)
 

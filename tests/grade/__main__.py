@@ -1,9 +1,9 @@
 """Grade a folder of submissions: `python -m tests.grade FOLDER`.
 
-One folder or one notebook each. A submission is a job of its own: FOLDER may be a single one, too.
-Out, in `--out`: class.csv, junit.xml, and for each submission a folder with result.json,
-feedback.html and, on request, Gradescope's results.json. What is finished is not graded again
-unless it or the checks changed.
+One folder or one notebook each, or files that a learning platform named after students. A
+submission is a job of its own: FOLDER may be a single one, too. Out, in `--out`: class.csv,
+junit.xml, and for each submission a folder with result.json, feedback.html and, on request,
+Gradescope's results.json. What is finished is not graded again unless it or the checks changed.
 """
 
 from __future__ import annotations
@@ -11,12 +11,15 @@ from __future__ import annotations
 import argparse
 import contextlib
 import csv
+import functools
 import hashlib
 import io
 import json
 import math
+import queue
 import re
 import sys
+import time
 import traceback
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict
@@ -27,24 +30,66 @@ import torch
 from lbw_minimal.training import InputError, write_atomic
 from tests.grade import feedback, sandbox
 from tests.grade.exercise import Exercise, everything
+from tests.grade.files import File, in_order, printable
+from tests.grade.handed_in import Submission, submissions, wanted
 from tests.grade.judge import UNDONE, Result, best, judge, nothing
 from tests.grade.sandbox import Lost, Sandbox
-from tests.grade.submission import MOST, RELEASED, Answer, Unreadable, answer, read
+from tests.grade.submission import Answer, Notebook, Unreadable, answer, parse
 
-MANY = 50  # notebooks of one submission that are read
 SEED = 2  # other inputs than those of the students' own checks, which could be learnt by heart
 
 
 def main(argv=None) -> int:
     """Returns the exit code: 2 where there is nothing to grade, 1 if the grader failed on a
-    submission, 130 if it was interrupted."""
+    submission or could not write, 130 if it was interrupted."""
+    args = _arguments(argv)
+    try:
+        entries = submissions(args.folder, args.out)
+        ids, chosen = wanted(args.notebooks, entries)
+        args.out.mkdir(parents=True, exist_ok=True)
+    except ValueError as e:
+        say(e, sys.stderr)
+        return 2
+    except OSError as e:
+        say(f"{args.out}: cannot write there ({e.strerror}); give another --out", sys.stderr)
+        return 2
+    if not args.ray:  # on a cluster each node looks at its own
+        if args.require_bubblewrap and (lacks := sandbox.bubblewrap()[1]):
+            say(lacks, sys.stderr)
+            return 2
+        if lacks := sandbox.warning():
+            say(f"warning: {lacks}", sys.stderr)
+    if entries[0].paths[0][0] == args.folder:
+        say(f"{args.folder} is graded as one submission")
+    if chosen:
+        say(chosen)
+    torch.set_num_threads(1)
+    try:
+        grades = _grade_all(args, entries, ids)
+    except InputError as e:
+        say(e, sys.stderr)
+        return 2
+    except KeyboardInterrupt:
+        say("interrupted; the same command goes on where this one was", sys.stderr)
+        return 130
+    written = [
+        keep(args.out / "class.csv", table(grades, ids)),
+        keep(args.out / "junit.xml", feedback.junit(grades)),
+    ]
+    if not written[0]:
+        say(table(grades, ids))
+    return 0 if all(written) and not any("failed" in g for g in grades) else 1
+
+
+def _arguments(argv) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="python -m tests.grade", description=__doc__.split("\n")[0]
     )
     parser.add_argument("folder", type=Path, help="submissions: one folder or one notebook each")
     parser.add_argument("--out", type=Path, default=Path("grades"))
     parser.add_argument(
-        "--notebooks", help="numbers, such as 5 or 5,6; default: all that anyone handed in"
+        "--notebooks",
+        help="numbers of those that were set, such as 5 or 5,6; default: what most handed in",
     )
     parser.add_argument(
         "--seed", type=int, default=SEED, help="of the inputs; students have 0 (%(default)s)"
@@ -56,135 +101,123 @@ def main(argv=None) -> int:
     parser.add_argument(
         "--gradescope", action="store_true", help="write results.json for Gradescope, too"
     )
-    args = parser.parse_args(argv)
+    parser.add_argument(
+        "--require-bubblewrap", action="store_true", help="stop where bubblewrap does not start"
+    )
+    return parser.parse_args(argv)
+
+
+def say(text: object, where=None) -> None:
+    """Print what may hold a stranger's words; a terminal that is gone stops nothing."""
+    where = where or sys.stdout
+    coding = getattr(where, "encoding", None) or "utf-8"
+    text = printable(str(text)).encode(coding, "backslashreplace").decode(coding)
+    with contextlib.suppress(OSError, ValueError):
+        print(text, file=where, flush=True)
+
+
+def keep(path: Path, text: str) -> bool:
+    """Write a file; where that fails (a full disk) say so. Returns whether it is there."""
     try:
-        entries = submissions(args.folder, args.out)
-        ids = wanted(args.notebooks, entries)
-        args.out.mkdir(parents=True, exist_ok=True)
-    except ValueError as e:
-        print(e, file=sys.stderr)
-        return 2
+        write_atomic(path, text)
     except OSError as e:
-        print(f"{args.out}: cannot write there ({e.strerror}); give another --out", file=sys.stderr)
-        return 2
-    if (lacks := sandbox.warning()) and not args.ray:  # on a cluster each node looks at its own
-        print(f"warning: {lacks}", file=sys.stderr)
-    torch.set_num_threads(1)
+        say(f"{path}: NOT WRITTEN, {e.strerror}", sys.stderr)
+        return False
+    return True
+
+
+def _grade_all(args, entries: list[Submission], ids: list[str]) -> list[dict]:
+    """The records of all submissions. Raises InputError where a cluster cannot grade, and
+    KeyboardInterrupt."""
+    boxes: queue.SimpleQueue[Sandbox] = queue.SimpleQueue()
+    for _ in range(args.jobs):
+        boxes.put(Sandbox())
+    done = []
 
     def job(entry, graded=None):
+        box = boxes.get()
         try:
-            done = grade_once(entry, ids, args.out, args.gradescope, args.seed, graded)
+            grades = grade_once(entry, ids, args.out, args.gradescope, args.seed, box, graded)
+            points = f"{grades['points']:g} of {grades['most']:g}"
         except Exception as e:  # the class goes on; without a result.json this is tried again
-            traceback.print_exc()
-            why = f"NOT GRADED, {type(e).__name__}: {e}"
-            print(f"{entry.name}: {why}", file=sys.stderr)
-            results = [nothing(everything()[id], why) for id in ids]
-            return record(entry, results, [why]) | {"failed": True}
-        print(f"{entry.name}: {done['points']:g} of {done['most']:g}", flush=True)
-        return done
+            box.kill()
+            points = f"NOT GRADED, {type(e).__name__}: {e}"
+            say(f"{traceback.format_exc()}{entry.name}: {points}", sys.stderr)
+            results = [nothing(everything()[id], points) for id in ids]
+            grades = record(entry, results, [points]) | {"failed": True}
+        finally:
+            boxes.put(box)
+        done.append(entry)
+        say(f"[{len(done)}/{len(entries)}] {entry.name}: {points}")
+        return grades
 
     with ThreadPoolExecutor(args.jobs) as pool:
         try:
             if args.ray:
-                grades = on_cluster(job, entries, ids, args.out, args.seed)
-            else:
-                grades = list(pool.map(job, entries))
-        except InputError as e:
-            print(e, file=sys.stderr)
-            return 2
+                return on_cluster(job, entries, ids, args)
+            return list(pool.map(job, entries))
         except KeyboardInterrupt:
             pool.shutdown(wait=False, cancel_futures=True)
-            print("interrupted; the same command goes on where this one was", file=sys.stderr)
-            return 130
-    write_atomic(args.out / "class.csv", table(grades, ids))
-    write_atomic(args.out / "junit.xml", feedback.junit(grades))
-    return 1 if any("failed" in g for g in grades) else 0
+            raise
+        finally:
+            pool.shutdown()
+            while not boxes.empty():
+                boxes.get().kill()
 
 
-def submissions(folder: Path, out: Path) -> list[Path]:
-    """The submissions in a class's folder. Raises ValueError where there are none.
+def grade(
+    files: list[File], ids: list[str], seed: int = SEED, box: Sandbox | None = None
+) -> tuple[list[Result], list[str]]:
+    """Results of the exercises `ids` in a submission's notebooks, and what was odd about these.
 
-    A folder of notebooks that are all called as they were released is one submission.
+    box: a sandbox to run them in, else one of their own.
     """
-    if not folder.exists():
-        raise ValueError(f"{folder}: no such folder")
-    if not folder.is_dir() and folder.suffix != ".ipynb":
-        raise ValueError(f"{folder}: neither a folder nor a notebook; unpack an archive first")
-    inside = {path.relative_to(folder) for path in notebooks(folder)}
-    released = {path.relative_to(RELEASED) for path in RELEASED.glob("*")}
-    if folder.is_file() or (inside and inside <= released):
-        print(f"{folder} is graded as one submission")
-        return [folder]
-    found = sorted(p for p in folder.iterdir() if not hidden(p) and p.resolve() != out.resolve())
-    if not found:
-        raise ValueError(f"{folder}: no submissions in it")
-    return found
-
-
-def wanted(numbers: str | None, entries: list[Path]) -> list[str]:
-    """The exercises of notebooks by their numbers, "5" or "5,6"; else of all that were handed in.
-
-    Raises ValueError where there are none.
-    """
-    known = sorted({id.split(".")[0] for id in everything()}, key=int)
-    given = [n.strip() for n in numbers.split(",")] if numbers else handed_in(entries)
-    given = [n.lstrip("0") or "0" for n in given if n]
-    if strange := [n for n in given if n not in known]:
-        raise ValueError(f"no notebook {', '.join(strange)}: there are {', '.join(known)}")
-    if not given:
-        raise ValueError(
-            "nobody handed in a notebook of the course; --notebooks says which to expect"
-        )
-    return [id for id in everything() if id.split(".")[0] in given]
-
-
-def hidden(entry: Path) -> bool:
-    """Whether an entry of the class folder is the system's, such as .DS_Store, not a student's."""
-    return entry.name[0] == "." and not notebooks(entry)
-
-
-def notebooks(entry: Path) -> list[Path]:
-    """The notebooks of a submission, whatever they are called."""
-    if entry.is_symlink():
-        return []
-    if entry.is_file():
-        return [entry] if entry.suffix == ".ipynb" else []
-    found = (p for p in sorted(entry.rglob("*.ipynb")) if ".ipynb_checkpoints" not in p.parts)
-    return [p for p in found if not p.is_symlink()][:MANY]
-
-
-def handed_in(entries: list[Path]) -> list[str]:
-    """Numbers of the notebooks that the class handed in."""
-    found = set()
-    for path in (path for entry in entries for path in notebooks(entry)):
-        with contextlib.suppress(Unreadable):
-            found.add(read(path).number)
-    return sorted(found - {""})
-
-
-def grade(entry: Path, ids: list[str], seed: int = SEED) -> tuple[list[Result], list[str]]:
-    """Results of the exercises `ids` in one submission, and what went wrong with its files."""
+    if box is None:
+        with Sandbox() as box:
+            return grade(files, ids, seed, box)
     books, notes = [], []
-    for path in notebooks(entry):
+    for file in in_order(files):
         try:
-            books.append(read(path))
+            books.append(parse(file))
         except Unreadable as e:
-            notes.append(f"{path.name}: {e}")
-    if not books and not notes:
+            notes.append(f"{file.name}: {e}")
+    if not files:
         notes.append("no notebook found; an archive has to be unpacked first")
-    known, results = everything(), []
-    with Sandbox() as box:
-        for id in ids:
-            given = answer(known[id], books)
-            if given is None:
-                results.append(nothing(known[id], "no cell with this exercise", open=True))
-                continue
-            if given.elsewhere:
-                notes.append(
-                    f"{id} stands in {given.elsewhere}, too; that of {given.where} was graded"
-                )
-            results.append(grade_one(known[id], given, box, seed))
+    known, results, left = everything(), [], float(sandbox.SUBMISSION)
+    twice: dict[tuple[str, str], list[str]] = {}
+    for id in ids:
+        given = answer(known[id], books)
+        if given is None:
+            results.append(nothing(known[id], "no cell with this exercise", open=True))
+            continue
+        if given.elsewhere:
+            twice.setdefault((given.elsewhere, given.where), []).append(id)
+        box.start()
+        began = time.monotonic()
+        results.append(grade_one(known[id], given, box, seed, left))
+        left -= time.monotonic() - began
+    for (other, taken), some in twice.items():
+        stand = "stand" if some[1:] else "stands"
+        notes.append(f"{', '.join(some)} {stand} in {other}, too; that of {taken} was graded")
+    if more := _not_set(books, ids):
+        notes.append(f"not graded, since it was not set: notebook {', '.join(more)}")
     return results, notes
+
+
+def _not_set(books: list[Notebook], ids: list[str]) -> list[str]:
+    """Numbers of notebooks that a student has worked on though they were not asked for."""
+    there = {book.number for book in books if book.number}
+    more = there - {id.split(".")[0] for id in ids}
+    worked = [
+        n
+        for n in more
+        if any(
+            (given := answer(e, books)) and not given.open
+            for e in everything().values()
+            if e.id.split(".")[0] == n
+        )
+    ]
+    return sorted(worked, key=int)
 
 
 def grade_one(
@@ -192,11 +225,14 @@ def grade_one(
 ) -> Result:
     """The result of one answer, run in the sandbox; the best, where there are several.
 
-    seconds: what is left for the submission.
+    seconds: what is left for the submission, see `sandbox.SUBMISSION`.
     """
     if given.open:
         return nothing(exercise, UNDONE, open=True)
-    box.start()
+    if given.broken:
+        return nothing(exercise, "a merge conflict is left in its cell (<<<<<<<): resolve it")
+    if seconds <= 0:
+        return nothing(exercise, f"the submission has used up its {sandbox.SUBMISSION} s")
     box.allow(min(sandbox.EXERCISE, seconds))
     ways = [
         (a, over) for a in (given, *given.others) for over in ((True, False) if a.own else (False,))
@@ -234,37 +270,58 @@ def in_sandbox(exercise: Exercise, given: Answer, over: bool, box: Sandbox, seed
         box.close()
 
 
-def grade_once(entry: Path, ids: list[str], out: Path, gradescope: bool, seed: int, graded) -> dict:
+def grade_once(
+    entry: Submission, ids: list[str], out: Path, gradescope: bool, seed: int, box: Sandbox, graded
+) -> dict:
     """Grade a submission and write its pages, unless done before for the same files and checks.
 
     graded: None; or what a cluster made of it, see `cluster.grade_here`, an exception if it failed.
+    Pages that cannot be written cost no points.
     """
     if isinstance(graded, Exception):
         raise graded
     folder = out / safe(entry.name)
-    digest, done = (graded[0], {}) if graded else before(entry, ids, out, seed)
+    if graded:
+        digest, results, notes = graded
+        done = {}
+    else:
+        files, notes = entry.files()
+        digest, done = before(entry, files, ids, out, seed)
     if not done:
-        results, notes = graded[1:] if graded else grade(entry, ids, seed)
+        if not graded:
+            results, more = grade(files, ids, seed, box)
+            notes = notes + more
         done = record(entry, results, notes) | {"digest": digest}
-        folder.mkdir(parents=True, exist_ok=True)
-        write_atomic(folder / "feedback.html", feedback.page(done))
-        # Last: it says that all the rest is there.
-        write_atomic(folder / "result.json", json.dumps(done, indent=1) + "\n")
-    if gradescope:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            write_atomic(folder / "feedback.html", feedback.page(done))
+            # Last: it says that all the rest is there.
+            write_atomic(folder / "result.json", json.dumps(done, indent=1) + "\n")
+        except OSError as e:
+            done["failed"] = True
+            done["notes"].append(f"its pages could not be written ({e.strerror})")
+            say(f"{entry.name}: {done['notes'][-1]}", sys.stderr)
+    if gradescope and "failed" not in done:
         text = json.dumps(feedback.gradescope(done), indent=1) + "\n"
-        write_atomic(folder / "results.json", text)
+        done |= {} if keep(folder / "results.json", text) else {"failed": True}
     return done
 
 
-def before(entry: Path, ids: list[str], out: Path, seed: int) -> tuple[str, dict]:
+def before(
+    entry: Submission, files: list[File], ids: list[str], out: Path, seed: int
+) -> tuple[str, dict]:
     """A submission's fingerprint, and its record if it was graded before with the same one."""
-    digest = fingerprint(entry, ids, seed)
+    digest = fingerprint(files, ids, seed)
     path = out / safe(entry.name) / "result.json"
-    done = json.loads(path.read_text()) if path.exists() else {}
-    return digest, done if done.get("digest") == digest else {}
+    try:
+        done = json.loads(path.read_bytes()) if path.is_file() else {}
+        same = done["digest"] == digest and {"points", "most", "exercises", "notes"} <= set(done)
+    except (OSError, ValueError, KeyError, TypeError):  # half a file, or somebody else's
+        same = False
+    return digest, done if same else {}
 
 
-def on_cluster(job, entries: list[Path], ids: list[str], out: Path, seed: int) -> list[dict]:
+def on_cluster(job, entries: list[Submission], ids: list[str], args) -> list[dict]:
     """What `job` makes of each submission, those not graded before graded on a Ray cluster.
 
     Raises InputError without Ray, or where no node's sandbox holds.
@@ -273,27 +330,30 @@ def on_cluster(job, entries: list[Path], ids: list[str], out: Path, seed: int) -
 
     grades, there = {}, []
     for entry in entries:
-        try:
-            digest, done = before(entry, ids, out, seed)
+        with contextlib.suppress(Exception):  # `job` meets it again, and says so
+            files, notes = entry.files()
+            digest, done = before(entry, files, ids, args.out, args.seed)
             if not done:
-                there.append((entry, (cluster.pack(notebooks(entry), entry), digest, ids, seed)))
+                how = (ids, args.seed, args.require_bubblewrap)
+                there.append((entry, (files, notes, digest, *how)))
                 continue
-        except OSError:
-            pass  # `job` meets it again, and says so
         grades[entry] = job(entry)
     for entry, graded in cluster.spread(there):
         grades[entry] = job(entry, graded)
     return [grades[entry] for entry in entries]
 
 
-def record(entry: Path, results: list[Result], notes: list[str]) -> dict:
-    """What is known of a graded submission, as plain values."""
+def record(entry: Submission, results: list[Result], notes: list[str]) -> dict:
+    """What is known of a graded submission, as plain values that can be printed and written."""
+    exercises = [asdict(r) | {"points": r.points, "most": r.most} for r in results]
+    for outcome in (o for e in exercises for o in e["outcomes"]):
+        outcome["message"] = printable(outcome["message"])
     return {
-        "submission": entry.name,
-        "notes": notes,
+        "submission": printable(entry.name),
+        "notes": [printable(note) for note in notes],
         "points": sum(r.points for r in results),
         "most": sum(r.most for r in results),
-        "exercises": [asdict(r) | {"points": r.points, "most": r.most} for r in results],
+        "exercises": exercises,
     }
 
 
@@ -303,13 +363,19 @@ def safe(name: str) -> str:
     return f"{plain}-{hashlib.sha256(name.encode(errors='surrogateescape')).hexdigest()[:8]}"
 
 
-def fingerprint(entry: Path, ids: list[str], seed: int) -> str:
+def fingerprint(files: list[File], ids: list[str], seed: int) -> str:
     """Of the submission's notebooks and of the checks."""
-    sha = hashlib.sha256(f"{','.join(ids)} {seed}".encode())
-    for path in notebooks(entry):
-        size = path.stat().st_size
-        sha.update(f"{path.name} {size}".encode(errors="surrogateescape"))
-        sha.update(path.read_bytes() if size <= MOST else b"")
+    sha = hashlib.sha256(f"{','.join(ids)} {seed} {_checks()}".encode())
+    for file in in_order(files):
+        sha.update(f"{file.name} {file.why} {len(file.data)}".encode())
+        sha.update(file.data)
+    return sha.hexdigest()
+
+
+@functools.cache
+def _checks() -> str:
+    """A fingerprint of the grader's own code."""
+    sha = hashlib.sha256()
     for path in sorted(Path(__file__).parent.rglob("*.py")):
         sha.update(path.read_bytes())
     return sha.hexdigest()
@@ -322,12 +388,16 @@ def table(grades: list[dict], ids: list[str]) -> str:
     rows.writerow(["submission", "points", "of", *ids, "notes"])
     for g in grades:
         points = {e["id"]: f"{e['points']:g}" for e in g["exercises"]}
-        name = g["submission"]
-        if name[0] in "=+-@":  # a spreadsheet would take it for a formula
-            name = "'" + name
         totals = (f"{g['points']:g}", f"{g['most']:g}")
-        rows.writerow([name, *totals, *(points[id] for id in ids), "; ".join(g["notes"])])
+        marks = (points[id] for id in ids)
+        rows.writerow([harmless(g["submission"]), *totals, *marks, harmless("; ".join(g["notes"]))])
     return text.getvalue()
+
+
+def harmless(text: str) -> str:
+    """Text for a spreadsheet, which would take what begins with = + - @ for a formula; some take a
+    semicolon or a line break for the end of a cell."""
+    return re.sub(r"(^|[;,\t\n])(\s*)(?=[=+\-@\uff1d\uff0b\uff0d\uff20])", r"\1\2'", text)
 
 
 if __name__ == "__main__":

@@ -17,6 +17,7 @@ there.
 from __future__ import annotations
 
 import ast
+import functools
 import importlib
 import inspect
 import pkgutil
@@ -154,6 +155,7 @@ def _text(given) -> str:
     return textwrap.dedent(inspect.getsource(given))
 
 
+@functools.cache
 def everything() -> dict[str, Exercise]:
     """All exercises by id, in order."""
     found = {}

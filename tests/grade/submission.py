@@ -10,11 +10,22 @@ from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from tests.grade.cell.answer import STUB, bound, is_stub
+from tests.grade.cell.answer import bound, is_stub
 from tests.grade.exercise import Exercise, everything
+from tests.grade.files import RELEASED, File, read_all
 
-MOST = 20 << 20  # bytes of a notebook; those of the course have 0.1 MB
-RELEASED = Path(__file__).resolve().parents[2] / "notebooks"
+PARTS = 500_000  # lists and objects of a notebook's JSON; a long one has 5,000
+CELLS = 1_000  # of code; the course's have 30
+LENGTH = 200_000  # characters of a cell
+SOURCES = 1_000_000  # characters of all cells; the course's have 20,000
+CONFLICT = re.compile(r"^<{7} ", re.MULTILINE)
+# A line for IPython: %magic, !shell, names = %magic, ?name, name?
+MAGIC = re.compile(
+    r"(?P<indent>\s*)(?:(?P<names>[A-Za-z_][\w., ]*)=\s*)?"
+    r"(?:[%!]|\?{1,2}[\w.%]|%?[\w.*]+\?{1,2}\s*$)"
+)
+PIECE = re.compile(r"\"\"\"|'''|\"(?:\\.|[^\"\\\n])*\"?|'(?:\\.|[^'\\\n])*'?|#.*|[\[({]|[\])}]")
+ENDS = {quotes: re.compile(rf"(?:\\.|[^\\])*?{quotes}", re.DOTALL) for quotes in ('"""', "'''")}
 
 
 class Unreadable(Exception):
@@ -59,25 +70,54 @@ class Notebook:
 
 def read(path: Path) -> Notebook:
     """Raises Unreadable."""
-    if path.is_symlink() or not path.is_file():
-        raise Unreadable("not a plain file")
-    if path.stat().st_size > MOST:
-        raise Unreadable(
-            f"{path.stat().st_size >> 20} MB: a notebook of this course has less than {MOST >> 20}"
-        )
+    return parse(read_all([(path, path.name)])[0][0])
+
+
+def parse(file: File) -> Notebook:
+    """A notebook out of a file, in time and memory that its size limits. Raises Unreadable."""
+    if file.why:
+        raise Unreadable(file.why)
+    if not file.data.strip(b"\0 \t\r\n"):
+        raise Unreadable("no Jupyter notebook: the file is empty")
+    if sum(map(file.data.count, (b"[", b"{"))) > PARTS:
+        raise Unreadable(f"no notebook of this course: more than {PARTS:,} lists and objects")
     try:
-        found = json.loads(path.read_bytes().decode("utf-8-sig"))["cells"]
-        return Notebook(path.name, [cell for c in found if (cell := _cell(c))])
+        found = json.loads(file.data)["cells"]
+        code = [c for c in found if isinstance(c, dict) and c.get("cell_type") == "code"]
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as e:
-        raise Unreadable(f"no Jupyter notebook ({type(e).__name__})") from None
+        raise Unreadable(_why(file, e)) from None
+    if len(code) > CELLS:
+        raise Unreadable(f"no notebook of this course: {len(code):,} cells")
+    cells: list[Cell] = []
+    for cell in filter(None, map(_cell, code)):
+        cells.append(cell)
+        if sum(len(c.source) for c in cells) > SOURCES:
+            raise Unreadable(
+                f"no notebook of this course: more than {SOURCES:,} characters of code"
+            )
+    return Notebook(file.name, cells)
+
+
+def _why(file: File, error: Exception) -> str:
+    """Why a file is no notebook, to the student."""
+    if place := re.search(r"^\s*<{7} ", file.text, re.MULTILINE):
+        line = file.text.count("\n", 0, place.start()) + 1
+        return f"a merge conflict is left in it (<<<<<<<, near line {line}): resolve it, save again"
+    if file.text.lstrip("\ufeff \r\n\t").startswith("<"):
+        return "no Jupyter notebook but a web page: download the file itself"
+    if isinstance(error, ValueError) and "\ufffd" in file.text:
+        return "no Jupyter notebook: its text is not UTF-8"
+    if isinstance(error, json.JSONDecodeError) and error.pos >= len(file.text.rstrip()) - 1:
+        return "no Jupyter notebook: its end is missing"
+    return f"no Jupyter notebook ({type(error).__name__})"
 
 
 def _cell(cell) -> Cell | None:
-    """A code cell; None if it is of another kind, or damaged."""
+    """A code cell; None if it is damaged, or too long to be an answer."""
     try:
-        if cell["cell_type"] != "code":
-            return None
         text = cell["source"] if isinstance(cell["source"], str) else "".join(cell["source"])
+        if len(text) > LENGTH:
+            return None
         source = _plain(text)
         return Cell(source, _marked(cell, source), text.strip() in _released())
     except (KeyError, TypeError, AttributeError):
@@ -95,16 +135,60 @@ def _marked(cell, source: str) -> str:
 
 
 def _plain(text: str) -> str:
-    """Cell source as Python: IPython's own lines (%magic, !shell, name?) become calls to it."""
+    """Cell source as Python: without IPython's own lines (%magic, !shell, name?)."""
     text = re.sub(r"\A\s*%%.*\n", "", text)  # such as %%time, above a cell that is Python
     if _parse(text):
         return text
     from IPython.core.inputtransformer2 import TransformerManager  # slow, and seldom needed
 
-    try:
-        return TransformerManager().transform_cell(text)
+    try:  # prompts and indents; its other transformations take time as the square of the length
+        lines = text.splitlines(keepends=True)
+        for transform in TransformerManager().cleanup_transforms:
+            lines = transform(lines)
     except Exception:  # whatever a stranger's text does to it
         return text
+    return _without_magic(lines)
+
+
+def _without_magic(lines: list[str]) -> str:
+    """Python in place of IPython's lines: nothing, or None where they have a value."""
+    done, quotes, depth, goes_on, magic = [], "", 0, False, False
+    for line in lines:
+        if not goes_on:
+            magic = not quotes and not depth and MAGIC.match(line)
+        if not magic:
+            quotes, depth = _inside(line, quotes, depth)
+            done.append(line)
+        elif not goes_on:
+            done.append(
+                f"{magic['indent']}{magic['names']}= None\n"
+                if magic["names"]
+                else f"{magic['indent']}pass\n"
+            )
+        goes_on = line.rstrip("\r\n").endswith("\\")
+    return "".join(done)
+
+
+def _inside(line: str, quotes: str, depth: int) -> tuple[str, int]:
+    """The string of three quotes, and how many brackets, that the end of a line is inside of, from
+    those of its start."""
+    at = 0
+    while True:
+        if quotes:
+            end = ENDS[quotes].match(line, at)
+            if not end:
+                return quotes, depth
+            quotes, at = "", end.end()
+        piece = PIECE.search(line, at)
+        if not piece:
+            return quotes, depth
+        at = piece.end()
+        if piece[0] in ENDS:
+            quotes = piece[0]
+        elif piece[0] in "[({":
+            depth += 1
+        elif piece[0] in "])}":
+            depth = max(0, depth - 1)
 
 
 def _parse(source: str) -> ast.Module | None:
@@ -151,6 +235,7 @@ class Answer:
     below: list[tuple[str, bool]] = field(default_factory=list)
     own: bool = False
     open: bool = False  # nothing but what was handed out
+    broken: bool = False  # a merge conflict is left in it
     others: list[Answer] = field(default_factory=list)
 
 
@@ -158,11 +243,9 @@ def answer(exercise: Exercise, books: list[Notebook]) -> Answer | None:
     """What answers an exercise in the notebooks of a submission; None if there is nothing.
 
     A cell counts that binds its name by more than the stub: marked for it, or in a notebook of the
-    exercise's number. Else a cell marked for it. Of several notebooks counts the one that is
-    called as it was released.
+    exercise's number. Else a cell marked for it. Of several notebooks the last counts.
     """
     number = exercise.id.split(".")[0]
-    books = sorted(books, key=lambda book: (RELEASED / book.name).is_file())
     found = []
     for book in books:
         places = [
@@ -203,6 +286,7 @@ def _untouched(exercise: Exercise, books: list[Notebook]) -> Answer | None:
     found = _around(exercise, *cells[-1])
     tree = _parse(found.source)
     found.open = bool(tree) and any(map(is_stub, tree.body))
+    found.broken = not tree and bool(CONFLICT.search(found.source))
     return found
 
 

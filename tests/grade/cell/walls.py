@@ -8,9 +8,7 @@ page: setrlimit(2), capset(2), landlock(7), seccomp(2), seccomp_unotify(2).
 import contextlib
 import ctypes
 import errno
-import fcntl
 import os
-import resource
 import signal
 import socket
 import struct
@@ -25,6 +23,8 @@ def confine(memory: int, cpu: int, readable: list[str], above: socket.socket) ->
     counts threads, see `count_threads`; it is sent where they ask. Raises OSError where a wall does
     not stand.
     """
+    import resource  # not where a notebook's check() imports this, on Windows
+
     with open("/proc/self/statm") as f:
         size = int(f.read().split()[0]) * os.sysconf("SC_PAGE_SIZE")
     limits = {
@@ -195,6 +195,8 @@ def ask_for_threads(above: socket.socket) -> bool:
 
 def count_threads(listener: int, pid: int) -> None:
     """Answer one question of process `pid`: a new thread, yes, unless it has THREADS."""
+    import fcntl
+
     with contextlib.suppress(OSError):  # it is gone
         asked = bytearray(80)
         fcntl.ioctl(listener, RECEIVE, asked)
