@@ -129,6 +129,41 @@ class Exercise:
         return call
 
 
+GRADIENTS = """
+    def probe(*args):
+        *args, ask = args
+        if ask == "values":
+            return {name}(*args)
+        leaves = {{k: args[i].clone().requires_grad_() for i, k in {leaves}.items()}}
+        for i, k in {leaves}.items():
+            args[i] = leaves[k]
+        found = {{}}
+        out = {name}(*args)
+        for j, part in enumerate(out if isinstance(out, (list, tuple)) else [out]):
+            if torch.is_tensor(part) and part.requires_grad:
+                # Weighted, or in a sum of many numbers gradients could cancel.
+                weights = torch.cos(torch.arange(float(part.numel()))).view(part.shape)
+                total = (weights * part).sum()
+                grads = torch.autograd.grad(
+                    total, list(leaves.values()), allow_unused=True, retain_graph=True
+                )
+            else:
+                grads = [None] * len(leaves)
+            for (k, leaf), g in zip(leaves.items(), grads):
+                which = f" of number {{j + 1}}" if isinstance(out, (list, tuple)) else ""
+                found[f"the gradient{{which}} for {{k}}"] = torch.zeros_like(leaf) if g is None else g
+        return found
+"""
+
+
+def gradients(name: str, **leaves: int) -> str:
+    """A probe that asks for "values" or for the "gradient" with respect to some arguments.
+
+    name: of the function. leaves: names and positions of these arguments.
+    """
+    return GRADIENTS.format(name=name, leaves={i: k for k, i in leaves.items()})
+
+
 def exercise(id: str, title: str, *, given: tuple = (), probe: str = ""):
     """Make an exercise of the function or class below.
 

@@ -6,7 +6,6 @@ else's (`call`): the notebook calls its own function, the grader a process it do
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
@@ -18,6 +17,7 @@ from tests.grade.sandbox import Lost
 
 OPEN = ("NotImplementedError", "StillOpen")  # what an untouched exercise raises
 UNDONE = "not done yet"
+CHANGES = "it changes its inputs: work on a copy"
 
 
 @dataclass
@@ -87,12 +87,11 @@ def judge(exercise: Exercise, call, seed: int = 0, renew=None) -> Result:
     nothing, also where it happens to be right; nor does one that hangs on what it was asked before.
     The order of the questions hangs on the seed, so that counting them helps nobody.
     """
-    checks, reference, known = exercise.checks, exercise.run(exercise.source), {}
-    wrong = [(m.hint, exercise.run(exercise.wrong(m))) for m in exercise.mistakes]
-    said, left, hints = [""] * len(checks), [c.trials for c in checks], [[] for _ in checks]
-    answers, truths, lost = [], [], ""
+    checks, reference = exercise.checks, exercise.run(exercise.source)
+    said, left, lost = [""] * len(checks), [c.trials for c in checks], ""
+    asked = []
     for i, args in _questions(exercise, seed):
-        if said[i]:
+        if said[i] == UNDONE:
             continue
         try:
             got, changed = call(args)
@@ -103,15 +102,8 @@ def judge(exercise: Exercise, call, seed: int = 0, renew=None) -> Result:
         if type(got) is Raised and got in OPEN:
             said[i] = UNDONE
             continue
-        want = reference(args)
-        answers.append(got)
-        truths.append(want)
-        known.setdefault(i, (args, got))
-        said[i] = _message(checks[i], got, want, args)
-        if said[i]:
-            hints[i] = [hint for hint, w in wrong if _same(checks[i], got, w(args), want)]
-        elif changed:
-            said[i] = "it changes its inputs: work on a copy"
+        asked.append(Asked(checks[i], args, got, reference(args)))
+        said[i] = said[i] or asked[-1].message or (CHANGES if changed else "")
     if all(message == UNDONE for message in said):
         return nothing(exercise, UNDONE, open=True)
     result = Result(exercise.id, exercise.title)
@@ -119,17 +111,28 @@ def judge(exercise: Exercise, call, seed: int = 0, renew=None) -> Result:
         message = message or (lost if more else "")
         points = 0 if message else check.points
         result.outcomes.append(Outcome(check.label, points, check.points, message))
-    _explain(result, hints, lost)
-    if result.points and not lost:
-        same = _all_same(answers) and not _all_same(truths)
-        message = SAME if same else _repeat(list(known.values()), call, renew)
-        if message:
-            for o in result.outcomes:
-                o.points, o.message = 0, o.message or message
+    if hint := _hint(exercise, asked):
+        failed = {a.check.label for a in asked if a.message}
+        for o in result.outcomes:
+            o.message = hint if o.label in failed else o.message
+    if result.points and not lost and (message := _doubt(asked, call, renew)):
+        for o in result.outcomes:
+            o.points, o.message = 0, o.message or message
     return result
 
 
-SAME = "it returns the same, whatever it is given"
+@dataclass
+class Asked:
+    """A question, the answer, the right one, and what to say of it: nothing if it is right."""
+
+    check: Check
+    args: tuple
+    got: object
+    want: object
+    message: str = ""
+
+    def __post_init__(self):
+        self.message = _message(self.check, self.got, self.want, self.args)
 
 
 def _questions(exercise: Exercise, seed: int):
@@ -140,17 +143,17 @@ def _questions(exercise: Exercise, seed: int):
         yield int(i), exercise.checks[i].inputs(sources[i])
 
 
-def _explain(result: Result, hints: list[list[str]], lost: str) -> None:
-    """Put a hint in place of a message where an anticipated mistake explains it.
+def _hint(exercise: Exercise, asked: list[Asked]) -> str:
+    """That of the anticipated mistake that answers as the student does, wherever it was asked.
 
-    On some inputs two mistakes give the same answer: the one that explains most checks is it, if
-    that is half of what went wrong. A mistake that explains less happens to give the same there.
+    One that agrees on part of the questions alone happens to give the same there.
     """
-    votes = Counter(hint for found in hints for hint in set(found))
-    wrong = sum(o.points == 0 and o.message not in (lost, UNDONE) for o in result.outcomes)
-    for outcome, found in zip(result.outcomes, hints, strict=True):
-        likely = [h for h in found if 2 * votes[h] >= wrong]
-        outcome.message = max(likely, key=votes.get, default=outcome.message)
+    wrong = [a for a in asked if a.message]
+    for mistake in exercise.mistakes if wrong else ():
+        theirs = exercise.run(exercise.wrong(mistake))
+        if all(_same(a, theirs(a.args)) for a in [*wrong, *(a for a in asked if not a.message)]):
+            return mistake.hint
+    return ""
 
 
 def _message(check: Check, got, want, args) -> str:
@@ -159,18 +162,22 @@ def _message(check: Check, got, want, args) -> str:
         return ""
     if type(got) is Raised and got == "ImportError" and "your own lines" in got.text:
         return got.text
+    if type(got) is Raised and got == "RuntimeError" and "requires grad" in got.text:
+        return f"it leaves torch, and the gradient ends there: {got.text}"
     if type(got) is Raised and got == "MemoryError":
         return "it needs more memory than an exercise may take (2 GB)"
     return wrong
 
 
-def _same(check: Check, got, theirs, want) -> bool:
-    """Whether the answer is that of a mistake, and not right."""
+def _same(asked: Asked, theirs) -> bool:
+    """Whether an answer is that of a mistake; where it is wrong, the mistake has to be, too."""
     if type(theirs) is Other:
         return False
-    if type(theirs) is Raised and theirs.text != getattr(got, "text", None):
+    if type(theirs) is Raised and theirs.text != getattr(asked.got, "text", None):
         return False
-    return not different(got, theirs, check) and bool(different(want, theirs, check))
+    if different(asked.got, theirs, asked.check):
+        return False
+    return not asked.message or bool(_message(asked.check, theirs, asked.want, asked.args))
 
 
 EXACT = Check("", lambda rng: (), 0, 1e-6, 1e-6, 1, None)
@@ -180,6 +187,14 @@ LOOSE = Check("", lambda rng: (), 0, 1e-5, 1e-4, 1, None)  # as a check that nam
 def _all_same(values) -> bool:
     """Whether values are equal, but for what a check would not notice."""
     return not any(different(v, values[0], LOOSE) for v in values)
+
+
+def _doubt(asked: list[Asked], call, renew) -> str:
+    """Why right answers earn nothing; empty if they do."""
+    if _all_same([a.got for a in asked]) and not _all_same([a.want for a in asked]):
+        return "it returns the same, whatever it is given"
+    known = list({id(a.check): (a.args, a.got) for a in reversed(asked)}.values())[::-1]
+    return _repeat(known, call, renew)
 
 
 def _repeat(known, call, renew) -> str:

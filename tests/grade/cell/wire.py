@@ -1,8 +1,8 @@
 """Values as bytes, between the judge and the process where a student's code runs.
 
 Numbers, strings, None, lists, tuples, dicts, numpy arrays and torch tensors pass, and what is one
-of these by another name; anything else arrives as `Other`, its type's name. Nothing is unpickled:
-bytes from a hostile process become plain values or `Garbage`.
+of these by another name, such as a namedtuple. Anything else arrives as `Other`, its type's name.
+Nothing is unpickled: bytes from a hostile process become plain values or `Garbage`.
 """
 
 import json

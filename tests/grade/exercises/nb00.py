@@ -12,7 +12,8 @@ def success_rate(distances, threshold):
 
 success_rate.check("ten episodes", lambda rng: (rng.uniform(0, 0.1, 10), 0.05))
 success_rate.check(
-    "any number of episodes, any threshold", lambda rng: (rng.uniform(0, 1, 37), 0.3)
+    "any number of episodes, any threshold",
+    lambda rng: (rng.uniform(0, 1, rng.integers(11, 40)), float(rng.uniform(0.2, 0.8))),
 )
 success_rate.check("all of them", lambda rng: (rng.uniform(0, 0.04, 5), 0.05))
 success_rate.check(
@@ -39,6 +40,30 @@ success_rate.mistake(
     "(distances < threshold).mean()",
     "(distances < threshold).sum() / 10",
 )
+success_rate.mistake("The threshold is the argument, not always 0.05.", "< threshold", "< 0.05")
+success_rate.mistake(
+    "You compare the mean distance: ask of each episode by itself, then take the mean of the "
+    "answers.",
+    "float((distances < threshold).mean())",
+    "float(distances.mean() < threshold)",
+)
+success_rate.mistake(
+    "You compare the mean distance: ask of each episode by itself, then take the mean of the "
+    "answers.",
+    "float((distances < threshold).mean())",
+    "distances.mean() < threshold",
+)
+success_rate.mistake(
+    "`len` counts the episodes, whatever became of them: the mean of truth values is the share of "
+    "the true ones.",
+    "(distances < threshold).mean()",
+    "len(distances < threshold) / len(distances)",
+)
+success_rate.mistake(
+    "One number for all episodes: you return a truth value for each.",
+    "float((distances < threshold).mean())",
+    "distances < threshold",
+)
 success_rate.mistake(
     "An episode at exactly the threshold is not below it: <, not <=.",
     "distances < threshold",
@@ -53,9 +78,29 @@ def to_pixels(z, size):
 
 to_pixels.check("keypoints anywhere", lambda rng: (rng.uniform(-1, 1, (5, 2)), 84))
 to_pixels.check(
-    "a whole trajectory, another size", lambda rng: (rng.uniform(-1, 1, (9, 5, 2)), 200)
+    "a whole trajectory, another size",
+    lambda rng: (rng.uniform(-1, 1, (*rng.integers(3, 12, 2), 2)), int(rng.integers(90, 250))),
 )
-to_pixels.check("the corners", lambda rng: (np.array([[-1.0, -1.0], [1.0, 1.0]]), 84))
+to_pixels.check(
+    "the corners",
+    lambda rng: (np.array([[-1.0, -1.0], [1.0, 1.0]]), int(rng.integers(20, 100))),
+)
+to_pixels.mistake("The picture's width is `size`, not always 84.", "* size", "* 84")
+to_pixels.mistake(
+    "Do not round: a keypoint may lie between two pixels.",
+    "(z + 1) / 2 * size",
+    "((z + 1) / 2 * size).astype(int)",
+)
+to_pixels.mistake(
+    "Do not round: a keypoint may lie between two pixels.",
+    "(z + 1) / 2 * size",
+    "np.round((z + 1) / 2 * size)",
+)
+to_pixels.mistake(
+    "The middle, 0, belongs at half of `size`: halve both summands, (z + 1) / 2.",
+    "(z + 1) / 2",
+    "(z / 2 + 1)",
+)
 to_pixels.mistake(
     "y already runs down in keypoints, as rows do in a picture: do not flip it.",
     "return (z + 1) / 2 * size",

@@ -13,11 +13,23 @@ def response(t, x0, kp):
 
 
 def _spring(rng):
-    return np.linspace(0, 0.5, 20), float(rng.uniform(0.01, 0.3)), float(rng.uniform(50, 1600))
+    return (
+        np.linspace(0, 0.5, rng.integers(10, 40)),
+        float(rng.uniform(0.01, 0.3)),
+        float(rng.uniform(50, 1600)),
+    )
 
 
 response.check("any stiffness, any distance", _spring, rtol=1e-4, atol=1e-8)
 response.check("at t = 0 it is x0", lambda rng: (np.zeros(1), float(rng.uniform(0.1, 1)), 400.0))
+response.mistake(
+    "omega is sqrt(kp); 2 sqrt(kp) is the damping kd.", "np.sqrt(kp)", "2 * np.sqrt(kp)"
+)
+response.mistake("It starts at x0: you leave out x0.", "x0 * (1", "(1")
+response.mistake("In the bracket stands omega t, not t.", "(1 + w * t)", "(1 + t)")
+response.mistake(
+    "Your spring overshoots: the bracket is 1 plus omega t.", "(1 + w * t)", "(1 - w * t)"
+)
 response.mistake("kp is the square of the natural frequency: take its root.", "np.sqrt(kp)", "kp")
 response.mistake(
     "It starts at rest; exp(-wt) alone starts with a jerk: the factor 1 + w t is missing.",
@@ -44,7 +56,8 @@ def task_inertia(J, M):
 
 task_inertia.check("a seven-joint arm", _arm)
 task_inertia.check(
-    "a two-joint arm, one direction", lambda rng: (rng.normal(size=(1, 2)), np.diag([2.0, 0.5]))
+    "a two-joint arm, one direction",
+    lambda rng: (rng.normal(size=(1, 2)), np.diag(rng.uniform(0.3, 3, 2))),
 )
 task_inertia.mistake(
     "You left out the last inverse: J M^-1 J^T is mobility, Lambda is its inverse.",
@@ -60,6 +73,21 @@ task_inertia.mistake(
     "J maps joints to the tip, (6, 7): the transpose goes last.",
     "J @ np.linalg.inv(M) @ J.T",
     "J.T @ J",
+)
+task_inertia.mistake(
+    "J maps joints to the tip, (6, 7): the transpose goes last, behind the inverse of M.",
+    "J @ np.linalg.inv(M) @ J.T",
+    "J.T @ np.linalg.inv(M) @ J",
+)
+task_inertia.mistake(
+    "1 / A divides number by number; the inverse of a matrix is np.linalg.inv(A).",
+    "np.linalg.inv(J @ np.linalg.inv(M) @ J.T)",
+    "1 / (J @ np.linalg.inv(M) @ J.T)",
+)
+task_inertia.mistake(
+    "* multiplies number by number; matrices are multiplied with @.",
+    "J @ np.linalg.inv(M) @ J.T",
+    "J * np.linalg.inv(M) * J.T",
 )
 
 
@@ -95,6 +123,16 @@ osc.mistake(
     "-kp * e - kd * v",
 )
 osc.mistake("Critical damping is kd = 2 sqrt(kp).", "2 * np.sqrt(kp)", "np.sqrt(kp)")
+osc.mistake("Critical damping is kd = 2 sqrt(kp), with the root.", "2 * np.sqrt(kp)", "2 * kp")
+osc.mistake(
+    "Lambda turns the whole acceleration into a force, the damping, too: mind the brackets.",
+    "(kp * e - kd * v)",
+    "(kp * e) - J.T @ (kd * v)",
+)
+osc.mistake(
+    "A force at the tip becomes torques by J's transpose.", "J.T @ task_inertia", "J @ task_inertia"
+)
+osc.mistake("The damping is missing: - kd v.", " - kd * v", "")
 
 
 @exercise("1.4", "Torques the tip does not feel", given=(task_inertia,))
@@ -114,6 +152,13 @@ nullspace.mistake(
 )
 nullspace.mistake(
     "You return the part the tip does feel: subtract it from the identity.", "np.eye(len(M)) - ", ""
+)
+nullspace.mistake("M^-1 stands at the end of it; yours is without.", " @ np.linalg.inv(M)", "")
+nullspace.mistake("At the end of it stands the inverse of M.", " @ np.linalg.inv(M)", " @ M")
+nullspace.mistake(
+    "The identity has the size of M, n by n; J has only as many rows as the tip has directions.",
+    "np.eye(len(M))",
+    "np.eye(len(J))",
 )
 nullspace.mistake(
     "An arm may have any number of joints n, the size of M: the identity is (n, n), not (7, 7).",
@@ -172,6 +217,12 @@ def _walk(rng, most=1, steps=20, ask="episode"):
     return rng.uniform(-most, most, (steps, 1)), int(rng.integers(1000)), ask
 
 
+def _far(rng):
+    """Fifty steps and one, mostly in one direction, so that it leaves [-1, 1]."""
+    actions, seed, ask = _walk(rng, 1, 51, "two episodes")
+    return rng.choice([-1, 1]) * np.where(rng.random((51, 1)) < 0.9, 1, actions), seed, ask
+
+
 def _home(rng):
     """From its start straight to 0, and about it until the 45th step."""
     seed = int(rng.integers(1000))
@@ -185,7 +236,7 @@ Point.check("actions out of bounds are clipped", lambda rng: _walk(rng, 4))
 Point.check("at 0 there is reward and success, and it goes on", _home)
 Point.check(
     "after 50 steps it is truncated, never terminated, and reset begins anew",
-    lambda rng: _walk(rng, 1, 51, "two episodes"),
+    _far,
 )
 Point.check(
     "its observations are of the kind that observation_space promises",
@@ -222,6 +273,26 @@ Point.mistake(
     "0.0, False",
     '{"is_success": done}',
     '{"is_success": False}',
+)
+Point.mistake(
+    "A full action moves the point by 0.05, not by 1.",
+    "self.x += 0.05 * float",
+    "self.x += float",
+)
+Point.mistake(
+    "The action is clipped; the position is free.",
+    "self.t += 1",
+    "self.x = float(np.clip(self.x, -1, 1))\n        self.t += 1",
+)
+Point.mistake(
+    "reset returns two things: the observation, and {} for what else there is to know.",
+    "return np.array([self.x], np.float32), {}",
+    "return np.array([self.x], np.float32)",
+)
+Point.mistake(
+    "step returns five things: observation, reward, terminated, truncated, info.",
+    "float(done), False, self.t >= 50, {",
+    "float(done), self.t >= 50, {",
 )
 Point.mistake("Success is |x| < 0.05; your bound is another.", "< 0.05", "< 0.1")
 Point.mistake(

@@ -44,7 +44,8 @@ def squash(mean, log_std, noise):
 
 
 def _moderate(rng):
-    return _uniform(rng, -1, 1, 6, 3), _uniform(rng, -2, -0.5, 6, 3), _uniform(rng, -1, 1, 6, 3)
+    shape = rng.integers((4, 1), (10, 6))
+    return (_uniform(rng, low, high, *shape) for low, high in ((-1, 1), (-2, -0.5), (-1, 1)))
 
 
 def _one_action(rng):
@@ -69,11 +70,14 @@ def _adds_up_to_one(got, args):
 
 
 def _far_out(rng):
-    side = torch.from_numpy(rng.choice([-1, 1], (8, 3)).astype(np.float32))
-    return side * _uniform(rng, 10, 25, 8, 3), _uniform(rng, -2, 0, 8, 3), _normal(rng, 8, 3)
+    shape = rng.integers((5, 2), (9, 5))
+    side = torch.from_numpy(rng.choice([-1, 1], shape).astype(np.float32))
+    return side * _uniform(rng, 10, 25, *shape), _uniform(rng, -2, 0, *shape), _normal(rng, *shape)
 
 
-squash.check("actions and log-densities near the middle", _moderate, atol=1e-3)
+squash.check(
+    "actions and log-densities near the middle", lambda rng: tuple(_moderate(rng)), atol=1e-3
+)
 squash.check(
     "the density over all actions adds up to 1", _one_action, atol=1e-3, verify=_adds_up_to_one
 )
@@ -98,6 +102,24 @@ squash.mistake(
     "detach at the end.",
     "torch.tanh(u), (log_normal - log_slope).sum(-1)",
     "torch.tanh(u).detach(), (log_normal - log_slope).sum(-1).detach()",
+)
+squash.mistake("Return the action, which is tanh(u), not u.", "return torch.tanh(u)", "return u")
+squash.mistake(
+    "The Gaussian is that of u: you ask for its density at the action.",
+    "0.5 * noise**2",
+    "0.5 * ((torch.tanh(u) - mean) / log_std.exp()) ** 2",
+)
+squash.mistake(
+    "A Gaussian has the factor 1 / sqrt(2 pi): its logarithm is missing.",
+    " - 0.5 * math.log(2 * math.pi)",
+    "",
+)
+squash.mistake(
+    "The constant -log(2 pi) / 2 belongs to each of an action's numbers: you take it off once.",
+    " - 0.5 * math.log(2 * math.pi)",
+    "",
+    "(log_normal - log_slope).sum(-1)",
+    "(log_normal - log_slope).sum(-1) - 0.5 * math.log(2 * math.pi)",
 )
 squash.mistake(
     "The noise is scaled by sigma, and what you are given is its logarithm: log_std.exp().",
@@ -154,11 +176,13 @@ def critic_target(reward, terminal, truncated, q1, q2, log_pi, alpha, gamma):
     return reward + gamma * (1 - terminal) * value
 
 
-def _transitions(rng, ended=None, n=8):
-    flags = {"terminal": torch.zeros(n), "truncated": torch.zeros(n)}
+def _transitions(rng, ended=None):
+    shape = [int(n) for n in rng.integers((6, 1), (11, 4))][: rng.integers(1, 3)]
+    flags = {"terminal": torch.zeros(shape), "truncated": torch.zeros(shape)}
     if ended:
-        flags[ended] = torch.from_numpy((rng.permutation(n) < 3).astype(np.float32))
-    reward, q1, q2, log_pi = (_normal(rng, n, scale=k) for k in (1, 5, 5, 2))
+        which = rng.permutation(math.prod(shape)).reshape(shape) < 3
+        flags[ended] = torch.from_numpy(which.astype(np.float32))
+    reward, q1, q2, log_pi = (_normal(rng, *shape, scale=k) for k in (1, 5, 5, 2))
     alpha, gamma = float(rng.uniform(0.1, 0.8)), float(rng.uniform(0.8, 0.99))
     return reward, flags["terminal"], flags["truncated"], q1, q2, log_pi, alpha, gamma
 
@@ -205,6 +229,21 @@ critic_target.mistake(
     "(1 - terminal)",
     "1",
 )
+critic_target.mistake("What comes later counts gamma times as much.", "gamma * ", "")
+critic_target.mistake(
+    "Where the time limit came there is a future, where the end came there is none: yours are "
+    "swapped.",
+    "(1 - terminal)",
+    "(1 - truncated)",
+)
+critic_target.mistake(
+    "terminal is 1 where it ended: what counts there is 1 - terminal.", "(1 - terminal)", "terminal"
+)
+critic_target.mistake(
+    "The reward of a terminal step counts: only what would come after it does not.",
+    "reward + gamma * (1 - terminal) * value",
+    "(1 - terminal) * (reward + gamma * value)",
+)
 critic_target.mistake(
     "The next action's entropy lies in the future too: it belongs inside what is discounted and "
     "cut off.",
@@ -220,17 +259,18 @@ critic_target.mistake(
     probe="""
     def probe(slow, fast, tau, times, ask):
         nets = []
-        for weight, bias in (slow, fast):
-            net = nn.Sequential(nn.Linear(*weight.shape[::-1]))
-            net.load_state_dict({"0.weight": weight, "0.bias": bias})
+        for layers in (slow, fast):
+            net = nn.Sequential(*(nn.Linear(*weight.shape[::-1]) for weight, _ in layers))
+            for layer, (weight, bias) in zip(net, layers):
+                layer.load_state_dict({"weight": weight, "bias": bias})
             nets.append(net)
         target, online = nets[0].requires_grad_(False), nets[1]
         for _ in range(times):
             follow(target, online, tau)
         if ask == "gradient":
-            return [target[0].weight.requires_grad, target[0].bias.requires_grad]
-        net = {"target": target, "online": online}[ask][0]
-        return [net.weight.detach(), net.bias.detach()]
+            return [p.requires_grad for p in target.parameters()]
+        net = {"target": target, "online": online}[ask]
+        return [p.detach() for p in net.parameters()]
     """,
 )
 def follow(target, online, tau):
@@ -240,12 +280,19 @@ def follow(target, online, tau):
 
 
 def _two_nets(rng, times, ask):
-    slow, fast = ([_normal(rng, 2, 3), _normal(rng, 2)] for _ in range(2))
+    """Networks of one to three layers, as lists of weight and bias."""
+    sizes = [int(n) for n in rng.integers(2, 6, rng.integers(2, 5))]
+    slow, fast = (
+        [[_normal(rng, n, m), _normal(rng, n)] for m, n in zip(sizes, sizes[1:], strict=False)]
+        for _ in range(2)
+    )
     return slow, fast, float(rng.uniform(0.05, 0.3)), times, ask
 
 
 follow.check("one step moves weights and biases", lambda rng: _two_nets(rng, 1, "target"))
-follow.check("five steps in a row", lambda rng: _two_nets(rng, 5, "target"))
+follow.check(
+    "several steps in a row", lambda rng: _two_nets(rng, int(rng.integers(2, 7)), "target")
+)
 follow.check("the online network stays as it is", lambda rng: _two_nets(rng, 3, "online"))
 follow.check("the copy stays out of the gradient", lambda rng: _two_nets(rng, 2, "gradient"))
 follow.mistake(
@@ -311,7 +358,8 @@ def temperature_loss(log_alpha, log_pi, target_entropy):
 def _temperature(rng, ask, entropy=0.0):
     """A batch whose entropy lies that far above its target."""
     target = float(rng.uniform(-6, -1))
-    log_pi = _normal(rng, 32) - target - entropy
+    log_pi = _normal(rng, int(rng.integers(24, 48)))
+    log_pi = log_pi - log_pi.mean() - target - entropy
     return _uniform(rng, -3, -0.5), log_pi, target, ask
 
 
@@ -360,6 +408,16 @@ temperature_loss.mistake(
     "Eq. 18 is an expectation: the mean over the batch, not its sum.", ".mean()", ".sum()"
 )
 temperature_loss.mistake(
+    "target_entropy is not used: without it alpha never comes to rest.",
+    " + target_entropy",
+    "",
+)
+temperature_loss.mistake(
+    "alpha multiplies both, log pi and the target: mind the brackets.",
+    "(alpha * (log_pi.detach() + target_entropy))",
+    "(alpha * log_pi.detach() + target_entropy)",
+)
+temperature_loss.mistake(
     "The loss is one number, the mean over the batch; yours still has one for each row.",
     ".mean()",
     "",
@@ -392,9 +450,10 @@ def actor_loss(actor, critics, s, noise, log_alpha):
 
 
 def _policy(rng, ask):
-    """A linear actor of 4 numbers, two bowls as critics, a batch of 12."""
-    weight, peaks = _normal(rng, 4, 4, scale=0.4), _normal(rng, 2, 4, 2)
-    return weight, peaks, _normal(rng, 12, 4), _normal(rng, 12, 2), _uniform(rng, -2, -0.5), ask
+    """A linear actor of S numbers, two bowls as critics, a batch of B."""
+    B, S, A = (int(n) for n in rng.integers((9, 3, 1), (14, 6, 4)))
+    weight, peaks = _normal(rng, S, 2 * A, scale=0.4), _normal(rng, 2, S, A)
+    return weight, peaks, _normal(rng, B, S), _normal(rng, B, A), _uniform(rng, -2, -0.5), ask
 
 
 actor_loss.check("the value of the loss", lambda rng: _policy(rng, "loss"))
@@ -455,6 +514,20 @@ actor_loss.mistake(
 )
 actor_loss.mistake(
     "Eq. 7 is an expectation: the mean over the batch, not its sum.", "- q).mean()", "- q).sum()"
+)
+actor_loss.mistake(
+    "The loss's value is right, but it is cut off from the actor: no gradient leaves your "
+    "function.",
+    "- q).mean()",
+    "- q).mean().detach()",
+)
+actor_loss.mistake(
+    "alpha weighs the log-density alone, not Q.",
+    "(log_alpha.exp().detach() * log_pi - q)",
+    "(log_alpha.exp().detach() * (log_pi - q))",
+)
+actor_loss.mistake(
+    "Both critics: you look at the first one alone.", "critics(s, a).amin(0)", "critics(s, a)[0]"
 )
 actor_loss.mistake(
     "The loss is one number, the mean over the batch; yours still has one for each state.",

@@ -15,13 +15,18 @@ def minimum_jerk(t, duration, start, end):
 
 def _reach(rng):
     T = float(rng.uniform(0.5, 2))
-    return np.linspace(0, T, 9), T, rng.normal(size=3), rng.normal(size=3)
+    return np.linspace(0, T, rng.integers(6, 16)), T, rng.normal(size=3), rng.normal(size=3)
 
 
 minimum_jerk.check("from a place to another", _reach, points=2)
 minimum_jerk.check(
     "after its time it stays at the end",
-    lambda rng: (np.array([1.5, 2.0, 9.0]), 1.5, rng.normal(size=3), rng.normal(size=3)),
+    lambda rng: (
+        (T := float(rng.uniform(0.5, 2))) + np.sort(rng.uniform(0, 5, rng.integers(4, 8))),
+        T,
+        rng.normal(size=3),
+        rng.normal(size=3),
+    ),
 )
 minimum_jerk.mistake(
     "The polynomial takes the share of the time, t / T: yours takes seconds.",
@@ -38,6 +43,18 @@ minimum_jerk.mistake(
     "np.clip(t / duration, 0, 1)",
     "t / duration",
 )
+minimum_jerk.mistake(
+    "s has one number a time, (n,), a place has three: give s a second dimension, s[:, None].",
+    "s[:, None] *",
+    "s *",
+)
+minimum_jerk.mistake(
+    "From start to end the way is end - start; yours is end alone.", "(end - start)", "end"
+)
+minimum_jerk.mistake(
+    "The hand goes from start to end; yours comes back.", "start, end):", "end, start):"
+)
+minimum_jerk.mistake("The powers in the polynomial are 3, 4 and 5.", "s**3 * (10", "s * (10")
 minimum_jerk.mistake("The hand begins at `start`: add the share of the way to it.", "start + ", "")
 minimum_jerk.mistake(
     "The polynomial is 10 s^3 - 15 s^4 + 6 s^5: one sign is wrong.", "+ 6 * s**2", "- 6 * s**2"
@@ -64,8 +81,9 @@ minimum_jerk.mistake(
         shape = p.createCollisionShape(p.GEOM_SPHERE, radius=1, physicsClientId=client)
         return shape, frictions
 
-    def probe(speed, ask):
-        other = p.connect(p.DIRECT)  # a call without physicsClientId=client goes there
+    def probe(speed, worlds, ask):
+        # A call without physicsClientId=client goes to the first of them.
+        other, *more = [p.connect(p.DIRECT) for _ in range(worlds)]
         client = p.connect(p.DIRECT)
         try:
             for _ in range(2):  # what such a call changes there
@@ -101,8 +119,8 @@ minimum_jerk.mistake(
             end = p.getBasePositionAndOrientation(cube, client)[0]
             return {"slid to x": end[0], "height": end[2]}
         finally:
-            p.disconnect(client)
-            p.disconnect(other)
+            for world in (client, other, *more):
+                p.disconnect(world)
     """,
 )
 def make_push(client):
@@ -120,7 +138,7 @@ def make_push(client):
 
 
 def _speed(rng, ask):
-    return float(rng.uniform(0.3, 0.6)), ask
+    return float(rng.uniform(0.3, 0.6)), int(rng.integers(1, 4)), ask
 
 
 make_push.check(
@@ -202,9 +220,9 @@ def moving_share(x, take, least):
     return float(moved.mean())
 
 
-def _takes(rng, take=25, n=8):
+def _takes(rng, take, n):
     """Cubes pushed for a while, forth or back; some by just `least` a frame. Sums are exact."""
-    least = 2.0**-11
+    least = 2.0 ** -int(rng.integers(9, 13))
     x = np.repeat(rng.integers(1024, 1434, n), take).reshape(n, take) * least
     for row in x:
         if rng.random() < 0.8:
@@ -213,11 +231,24 @@ def _takes(rng, take=25, n=8):
     return x.ravel(), take, least
 
 
-moving_share.check("eight takes", _takes, points=2)
-moving_share.check("takes of another length", lambda rng: _takes(rng, 12, 20))
+moving_share.check("a few takes", lambda rng: _takes(rng, 25, int(rng.integers(6, 12))), points=2)
+moving_share.check(
+    "takes of another length", lambda rng: _takes(rng, int(rng.integers(12, 20)), 20)
+)
 moving_share.check(
     "nothing ever moves within a take",
-    lambda rng: (np.repeat(rng.uniform(0.5, 0.7, 6), 10), 10, 0.0005),
+    lambda rng: (np.repeat(rng.uniform(0.5, 0.7, rng.integers(4, 8)), 10), 10, 0.0005),
+)
+moving_share.mistake(
+    "A row is a take: reshape(-1, take), not reshape(take, -1).",
+    "x.reshape(-1, take), axis=1",
+    "x.reshape(take, -1), axis=1",
+)
+moving_share.mistake(
+    "Within a take frames follow each other along a row, axis 1; along axis 0 you go from take to "
+    "take.",
+    "axis=1",
+    "axis=0",
 )
 moving_share.mistake(
     "Between two takes the cube is put elsewhere, and nobody pushed it: compare only within a "
@@ -256,8 +287,8 @@ def to_action(wanted, goal, step):
 
 
 def _wish(rng, far):
-    goal = rng.normal(size=3)
-    return goal + rng.uniform(-far, far, 3) * 0.03, goal, 0.03
+    goal, step = rng.normal(size=3), float(rng.uniform(0.01, 0.08))
+    return goal + rng.uniform(-far, far, 3) * step, goal, step
 
 
 to_action.check("a place within one step", lambda rng: _wish(rng, 0.5))
@@ -266,6 +297,21 @@ to_action.mistake(
     "An action is at most 1: clip it.",
     "np.clip((wanted - goal) / step, -1, 1)",
     "(wanted - goal) / step",
+)
+to_action.mistake("The largest step is the argument, not always 3 cm.", "/ step", "/ 0.03")
+to_action.mistake(
+    "An action is a share of the largest step, not a way in m: divide by step, then clip to "
+    "[-1, 1].",
+    "np.clip((wanted - goal) / step, -1, 1)",
+    "np.clip(wanted - goal, -step, step)",
+)
+to_action.mistake(
+    "A tip can go back: clip to [-1, 1], not to [0, 1].", "/ step, -1, 1)", "/ step, 0, 1)"
+)
+to_action.mistake(
+    "A place nearer than a step needs a part of it: yours goes a full step, always.",
+    "np.clip((wanted - goal) / step, -1, 1)",
+    "np.sign(wanted - goal)",
 )
 to_action.mistake("An action is a share of the largest step: divide by it.", " / step", "")
 to_action.mistake(

@@ -3,37 +3,58 @@
 import numpy as np
 import torch
 
-from tests.grade.exercise import exercise
+from tests.grade.exercise import exercise, gradients
 
 
 def _tensor(rng, *shape):
     return torch.from_numpy(np.float32(rng.normal(size=shape)))
 
 
-@exercise("4.1", "Adaptive instance normalisation")
+@exercise(
+    "4.1",
+    "Adaptive instance normalisation",
+    probe=gradients("adain", h=0, mean=1, std=2),
+)
 def adain(h, mean, std):
     mu = h.mean((2, 3), keepdim=True)
     sigma = (h.var((2, 3), unbiased=False, keepdim=True) + 1e-5).sqrt()
     return std[:, :, None, None] * (h - mu) / sigma + mean[:, :, None, None]
 
 
-def _features(rng, B=3, C=4):
-    h = 3 * _tensor(rng, B, C, 6, 7) + 5 * _tensor(rng, B, C, 1, 1)
-    return h, _tensor(rng, B, C), _tensor(rng, B, C).abs() + 0.2
+def _features(rng, ask="values", scale=1.0):
+    B, C, H, W = (int(n) for n in rng.integers((2, 2, 4, 5), (5, 6, 9, 10)))
+    h = 3 * _tensor(rng, B, C, H, W) + 5 * _tensor(rng, B, C, 1, 1)
+    return scale * h, _tensor(rng, B, C), _tensor(rng, B, C).abs() + 0.2, ask
 
 
-adain.check("features anywhere", _features, points=2, atol=1e-4, rtol=1e-3)
+adain.check("features anywhere", _features, atol=1e-4, rtol=1e-3)
 adain.check(
     "with mean 0 and std 1 only the style is gone",
-    lambda rng: (_features(rng)[0], torch.zeros(3, 4), torch.ones(3, 4)),
+    lambda rng: ((f := _features(rng))[0], 0 * f[1], torch.ones_like(f[2]), f[3]),
     atol=1e-4,
     rtol=1e-3,
 )
 adain.check(
     "channels that hardly vary: 1e-5 is added to the variance",
-    lambda rng: ((f := _features(rng))[0] * 1e-3, f[1], f[2]),
+    lambda rng: _features(rng, scale=1e-3),
     atol=1e-4,
     rtol=1e-3,
+)
+adain.check(
+    "the gradient passes through it", lambda rng: _features(rng, "gradient"), atol=1e-4, rtol=1e-3
+)
+adain.mistake(
+    "The values are right, but no gradient leaves your function, and no network would learn: no "
+    "detach, no numpy, no torch.no_grad.",
+    "std[:, :, None, None] * (h - mu) / sigma + mean[:, :, None, None]",
+    "(std[:, :, None, None] * (h - mu) / sigma + mean[:, :, None, None]).detach()",
+)
+adain.mistake(
+    "The values are right, but mu and sigma are functions of h, too: leave their gradient in.",
+    "h.mean((2, 3), keepdim=True)",
+    "h.mean((2, 3), keepdim=True).detach()",
+    "+ 1e-5).sqrt()",
+    "+ 1e-5).sqrt().detach()",
 )
 adain.mistake(
     "You normalise over the whole batch: each image has a style of its own, so average over H and "
@@ -72,19 +93,77 @@ adain.mistake(
 adain.mistake("Add 1e-5 to the variance; yours is without.", " + 1e-5", "")
 
 
-@exercise("4.2", "The game of Eq. 1, in squares")
+@exercise("4.2", "The game of Eq. 1, in squares", probe=gradients("gan_losses", real=0, made=1))
 def gan_losses(real, made):
     return ((real - 1) ** 2).mean() + (made**2).mean(), ((made - 1) ** 2).mean()
 
 
-def _scores(rng):
-    return _tensor(rng, 4, 1, 5, 5), _tensor(rng, 4, 1, 5, 5)
+def _scores(rng, ask="values", most=4):
+    """Scores of any shape; real ones and made ones differ in number."""
+    real, made = rng.choice(np.arange(2, 9), 2, replace=False)
+    more = rng.integers(1, 6, int(rng.integers(0, most)))
+    return _tensor(rng, real, *more), _tensor(rng, made, *more), ask
 
 
-gan_losses.check("scores anywhere", _scores, points=2)
+gan_losses.check("scores anywhere", _scores)
 gan_losses.check(
     "a critic that is always right, with more made frames than real ones",
-    lambda rng: (torch.ones(2, 1, 3, 3), torch.zeros(5, 1, 3, 3)),
+    lambda rng: ((s := _scores(rng))[0] * 0 + 1, torch.cat([s[1], s[0]]) * 0, s[2]),
+)
+gan_losses.check("the gradient reaches the scores", lambda rng: _scores(rng, "gradient"), atol=1e-6)
+gan_losses.mistake(
+    "The values are right, but no gradient leaves your function, and neither network would learn: "
+    "no detach, no item, no numpy, no torch.no_grad.",
+    "return ((real - 1) ** 2).mean() + (made**2).mean(), ((made - 1) ** 2).mean()",
+    "real, made = real.detach(), made.detach()\n"
+    "    return ((real - 1) ** 2).mean() + (made**2).mean(), ((made - 1) ** 2).mean()",
+)
+gan_losses.mistake(
+    "The values are right, but the critic's loss does not reach its scores of the made frames: "
+    "whoever calls you detaches the frames, you do not detach the scores.",
+    "(made**2)",
+    "(made.detach() ** 2)",
+)
+gan_losses.mistake(
+    "Means, not sums: the losses do not grow with the number of scores.",
+    "((real - 1) ** 2).mean() + (made**2).mean(), ((made - 1) ** 2).mean()",
+    "((real - 1) ** 2).sum() + (made**2).sum(), ((made - 1) ** 2).sum()",
+)
+gan_losses.mistake(
+    "Square each score's error, then take the mean; you square the mean.",
+    "((real - 1) ** 2).mean() + (made**2).mean(), ((made - 1) ** 2).mean()",
+    "(real.mean() - 1) ** 2 + made.mean() ** 2, (made.mean() - 1) ** 2",
+)
+gan_losses.mistake(
+    "The errors are squared; you take their absolute values.",
+    "((real - 1) ** 2).mean() + (made**2).mean(), ((made - 1) ** 2).mean()",
+    "(real - 1).abs().mean() + made.abs().mean(), (made - 1).abs().mean()",
+)
+gan_losses.mistake(
+    "That is Eq. 1 with its logarithms, of the scores' sigmoids; the kit plays the game in squares.",
+    "((real - 1) ** 2).mean() + (made**2).mean(), ((made - 1) ** 2).mean()",
+    "F.softplus(-real).mean() + F.softplus(made).mean(), F.softplus(-made).mean()",
+)
+gan_losses.mistake(
+    "That is Eq. 1 as it stands, with logarithms, and the critic's share with its sign turned; the "
+    "kit plays the game in squares.",
+    "((real - 1) ** 2).mean() + (made**2).mean(), ((made - 1) ** 2).mean()",
+    "F.softplus(-real).mean() + F.softplus(made).mean(), -F.softplus(made).mean()",
+)
+gan_losses.mistake(
+    "That is the hinge loss; here errors are squared, and the targets are 1 and 0.",
+    "((real - 1) ** 2).mean() + (made**2).mean(), ((made - 1) ** 2).mean()",
+    "F.relu(1 - real).mean() + F.relu(1 + made).mean(), -made.mean()",
+)
+gan_losses.mistake(
+    "That is Wasserstein's game, in means; here errors are squared, and the targets are 1 and 0.",
+    "((real - 1) ** 2).mean() + (made**2).mean(), ((made - 1) ** 2).mean()",
+    "made.mean() - real.mean(), -made.mean()",
+)
+gan_losses.mistake(
+    "The targets are 1 for real and 0 for made; yours are 1 and -1.",
+    "(made**2).mean()",
+    "((made + 1) ** 2).mean()",
 )
 gan_losses.mistake(
     "The critic's targets are swapped: real frames go to 1, made ones to 0.",
@@ -127,15 +206,24 @@ gan_losses.mistake(
     "4.3",
     "Three reconstructions (Eq. 2-4)",
     probe="""
-    def probe(x, y):
-        # Encoders and generators with recognisable constants, one for each domain.
-        content = {"x": lambda v: 0.5 * v + 0.1, "y": lambda v: 0.7 * v - 0.2}
-        style = {"x": lambda v: v.mean((2, 3)) + 0.3, "y": lambda v: 2 * v.mean((2, 3)) - 0.4}
+    def probe(x, y, w, ask):
+        # Encoders and generators of one weight each, (6,); those of the generators are trained.
+        content = {"x": lambda v: w[0] * v + 0.1, "y": lambda v: w[1] * v - 0.2}
+        style = {"x": lambda v: w[2] * v.mean((2, 3)), "y": lambda v: w[3] * v.mean((2, 3)) - 0.4}
+        g = w[4:].clone().requires_grad_()
         decode = {
-            "x": lambda c, s: c + 1.5 * s[:, :, None, None],
-            "y": lambda c, s: 0.8 * c - s[:, :, None, None],
+            "x": lambda c, s: c + g[0] * s[:, :, None, None],
+            "y": lambda c, s: g[1] * c - s[:, :, None, None],
         }
-        return tuple(float(v) for v in reconstructions(x, y, content, style, decode))
+        losses = reconstructions(x, y, content, style, decode)
+        if ask == "losses":
+            return [v.detach() if torch.is_tensor(v) else v for v in losses]
+        found = {}
+        for name, loss in zip(("image", "content", "style"), losses, strict=True):
+            tied = torch.is_tensor(loss) and loss.requires_grad
+            (grad,) = torch.autograd.grad(loss.sum(), g, retain_graph=True) if tied else (0 * w[4:],)
+            found[f"the gradient of the {name} loss for the generators"] = grad
+        return found
     """,
 )
 def reconstructions(x, y, content, style, decode):
@@ -147,13 +235,57 @@ def reconstructions(x, y, content, style, decode):
     return image, code, look
 
 
+def _both(rng, ask="losses"):
+    shape = 1 + int(rng.integers(4)), 3, *(int(n) for n in rng.integers(4, 10, 2))
+    weights = torch.from_numpy(np.float32(rng.uniform(0.4, 2, 6)))
+    return _tensor(rng, *shape), _tensor(rng, *shape) + 1, weights, ask
+
+
+reconstructions.check("two batches of images", _both, points=2)
 reconstructions.check(
-    "two batches of images",
-    lambda rng: (_tensor(rng, 2, 3, 6, 6), _tensor(rng, 2, 3, 6, 6)),
-    points=3,
+    "one image of each domain", lambda rng: ((b := _both(rng))[0][:1], b[1][:1], *b[2:])
 )
-reconstructions.check(
-    "images of another size", lambda rng: (_tensor(rng, 1, 3, 9, 5), _tensor(rng, 1, 3, 9, 5) + 1)
+reconstructions.check("the gradient reaches the generators", lambda rng: _both(rng, "gradient"))
+reconstructions.mistake(
+    "The values are right, but no gradient leaves your function, and no network would learn: no "
+    "detach, no item, no float, no torch.no_grad.",
+    "return image, code, look",
+    "return image.detach(), code.detach(), look.detach()",
+)
+reconstructions.mistake(
+    "Return Eq. 2, 3 and 4 in this order: image, content, style.",
+    "return image, code, look",
+    "return image, look, code",
+)
+reconstructions.mistake("Means of absolute differences, not sums.", ".abs().mean()", ".abs().sum()")
+reconstructions.mistake(
+    "The norms here are means of absolute differences, not lengths of vectors.",
+    ".abs().mean()",
+    ".norm()",
+)
+reconstructions.mistake(
+    "Take absolute values before the mean: differences of opposite sign would cancel.",
+    ".abs().mean()",
+    ".mean().abs()",
+)
+reconstructions.mistake(
+    "Asked for are the losses of domain x; yours are those of y.",
+    "(x, y, content, style, decode):",
+    "(y, x, content, style, decode):\n"
+    "    content, style, decode = (\n"
+    '        {"x": d["y"], "y": d["x"]} for d in (content, style, decode)\n'
+    "    )",
+)
+reconstructions.mistake(
+    "Eq. 3 compares what was read back with c_x, the content that went in; yours compares it with "
+    "y's.",
+    'decode["y"](c_x, s_y)) - c_x',
+    'decode["y"](c_x, s_y)) - c_y',
+)
+reconstructions.mistake(
+    "Eq. 4 compares the style that was read back with s_x; yours compares it with y's.",
+    '(decode["x"](c_y, s_x)) - s_x',
+    '(decode["x"](c_y, s_x)) - s_y',
 )
 reconstructions.mistake(
     "Eq. 3 decodes with the other domain's generator: c_x goes into G_Y with s_y, and comes back "
@@ -249,6 +381,32 @@ munit_loss.mistake(
     "lam_content weighs the content codes, lam_style the style codes; yours are swapped.",
     "lam_content, lam_style):",
     "lam_style, lam_content):",
+)
+munit_loss.mistake(
+    "lam_image weighs the images, lam_content the content codes; yours are swapped.",
+    "lam_image, lam_content,",
+    "lam_content, lam_image,",
+)
+munit_loss.mistake(
+    "lam_image weighs the images, lam_style the style codes; yours are swapped.",
+    "(L, lam_image, lam_content, lam_style):",
+    "(L, lam_style, lam_content, lam_image):",
+)
+munit_loss.mistake(
+    "In Eq. 5 the game has no weight: you multiply it by lam_image.",
+    'L["gan_x"] + L["gan_y"]\n        + lam_image * (L',
+    'lam_image * (L["gan_x"] + L["gan_y"]\n        + L',
+    '+ L["image_y"])',
+    '+ L["image_y"]))',
+)
+munit_loss.mistake(
+    "Each kind of reconstruction has its weight; you use none.",
+    "lam_style * ",
+    "",
+    "lam_content * ",
+    "",
+    "lam_image * ",
+    "",
 )
 munit_loss.mistake(
     "Losses add up; you average the two domains.",

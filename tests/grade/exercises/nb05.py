@@ -3,15 +3,23 @@
 import numpy as np
 import torch
 
-from tests.grade.exercise import exercise
+from tests.grade.exercise import exercise, gradients
 
 
 def _tensor(rng, *shape, scale=1.0):
     return torch.from_numpy(np.float32(scale * rng.normal(size=shape)))
 
 
-def _peaks(rng, B=2, K=3, h=7, w=9):
-    """Logits with one clear peak a map, off the diagonal, on a map that is no square."""
+def _map(rng):
+    """B, K, h and w of heat maps that are no squares."""
+    B, K = (int(n) for n in rng.integers((2, 2), (4, 6)))
+    h, w = (int(n) for n in rng.choice(np.arange(4, 13), 2, replace=False))
+    return B, K, h, w
+
+
+def _peaks(rng):
+    """Logits with one clear peak a map."""
+    B, K, h, w = _map(rng)
     logits = np.zeros((B, K, h, w), np.float32)
     for b in range(B):
         for k in range(K):
@@ -19,7 +27,7 @@ def _peaks(rng, B=2, K=3, h=7, w=9):
     return torch.from_numpy(logits)
 
 
-@exercise("5.1", "From heat map to keypoint")
+@exercise("5.1", "From heat map to keypoint", probe=gradients("soft_argmax", logits=0))
 def soft_argmax(logits):
     h, w = logits.shape[2:]
     p = logits.flatten(2).softmax(-1).view(logits.shape)
@@ -28,11 +36,63 @@ def soft_argmax(logits):
     return torch.stack([(p.sum(2) * x).sum(-1), (p.sum(3) * y).sum(-1)], -1)
 
 
-soft_argmax.check("a clear peak is found where it is", lambda rng: (_peaks(rng),))
+soft_argmax.check("a clear peak is found where it is", lambda rng: (_peaks(rng), "values"))
 soft_argmax.check(
-    "two things share the probability", lambda rng: (_tensor(rng, 2, 5, 21, 21, scale=2),)
+    "several things share the probability",
+    lambda rng: (_tensor(rng, *_map(rng), scale=2), "values"),
 )
-soft_argmax.check("logits as large as 200", lambda rng: (_tensor(rng, 1, 4, 8, 6, scale=200),))
+soft_argmax.check(
+    "logits as large as 200", lambda rng: (_tensor(rng, *_map(rng), scale=200), "values")
+)
+soft_argmax.check(
+    "it has a gradient, unlike an argmax", lambda rng: (_tensor(rng, *_map(rng)), "gradient")
+)
+soft_argmax.mistake(
+    "The values are right, but no gradient leaves your function, and the detector would not learn: "
+    "no detach, no numpy, no torch.no_grad.",
+    "p = logits",
+    "p = logits.detach()",
+)
+soft_argmax.mistake(
+    "Your softmax goes over the keypoints of a cell: it goes over the cells of a keypoint's map.",
+    "logits.flatten(2).softmax(-1).view(logits.shape)",
+    "logits.softmax(1)",
+)
+soft_argmax.mistake(
+    "Your softmax goes over all keypoints' maps at once: each map sums to 1 by itself.",
+    "logits.flatten(2).softmax(-1)",
+    "logits.flatten(1).softmax(-1)",
+)
+soft_argmax.mistake(
+    "Your softmax goes over each column by itself, so that a map sums to w, not to 1: flatten its "
+    "cells first.",
+    "logits.flatten(2).softmax(-1).view(logits.shape)",
+    "logits.softmax(2)",
+)
+soft_argmax.mistake(
+    "x belongs to the columns: sum p over the rows first, axis 2, then weigh with x.",
+    "(p.sum(2) * x).sum(-1), (p.sum(3) * y)",
+    "(p.sum(3) * x).sum(-1), (p.sum(2) * y)",
+)
+soft_argmax.mistake(
+    "Return (B, K, 2): x and y of a keypoint stand along the last axis.",
+    "(p.sum(3) * y).sum(-1)], -1)",
+    "(p.sum(3) * y).sum(-1)], 1)",
+)
+soft_argmax.mistake(
+    "The map fills [-1, 1]: yours fills [0, 1].",
+    "(2 * torch.arange(w) + 1) / w - 1",
+    "(torch.arange(w) + 0.5) / w",
+    "(2 * torch.arange(h) + 1) / h - 1",
+    "(torch.arange(h) + 0.5) / h",
+)
+soft_argmax.mistake(
+    "A cell's place is its centre, (2 j + 1) / w - 1; yours is its left or upper edge.",
+    "(2 * torch.arange(w) + 1) / w - 1",
+    "2 * torch.arange(w) / w - 1",
+    "(2 * torch.arange(h) + 1) / h - 1",
+    "2 * torch.arange(h) / h - 1",
+)
 soft_argmax.mistake(
     "x and y are swapped: x runs along the last axis, to the right, and comes first.",
     "torch.stack([(p.sum(2) * x).sum(-1), (p.sum(3) * y).sum(-1)], -1)",
@@ -80,7 +140,7 @@ soft_argmax.mistake(
 )
 
 
-@exercise("5.2", "One map per image (the H of Eq. 6)")
+@exercise("5.2", "One map per image (the H of Eq. 6)", probe=gradients("heat_map", z=0))
 def heat_map(z, sigma, size):
     cells = (2 * torch.arange(size) + 1) / size - 1
     x = torch.exp(-(((cells - z[..., 0, None]) / sigma) ** 2))
@@ -89,15 +149,54 @@ def heat_map(z, sigma, size):
     return 1 - (1 - h).prod(1, keepdim=True)
 
 
-def _points(rng, K=5):
-    return torch.from_numpy(np.float32(rng.uniform(-0.9, 0.9, (3, K, 2))))
+def _points(rng, least=0.1, K=None, ask="values"):
+    """Keypoints (B, K, 2), a width and a size."""
+    B, some, size = (int(n) for n in rng.integers((2, 2, 12), (6, 7, 25)))
+    z = rng.uniform(-0.9, 0.9, (B, K or some, 2))
+    sigma = float(rng.uniform(least, least + 0.15))
+    return torch.from_numpy(np.float32(z)), sigma, size, ask
 
 
-heat_map.check("keypoints apart", lambda rng: (_points(rng, 1), 0.1, 21))
-heat_map.check("keypoints anywhere", lambda rng: (_points(rng), 0.2, 21))
+heat_map.check("one keypoint", lambda rng: _points(rng, K=1))
+heat_map.check("keypoints anywhere", lambda rng: _points(rng, 0.2))
 heat_map.check(
-    "two on one spot: no value above 1",
-    lambda rng: (_points(rng, 1).expand(3, 4, 2).clone(), 0.3, 15),
+    "several on one spot: no value above 1",
+    lambda rng: ((p := _points(rng, 0.3))[0][:, :1].expand(p[0].shape).clone(), *p[1:]),
+)
+heat_map.check(
+    "the gradient reaches the keypoints", lambda rng: _points(rng, 0.2, ask="gradient"), atol=1e-4
+)
+heat_map.mistake(
+    "The values are right, but no gradient leaves your function, and the detector would not learn: "
+    "no detach, no numpy, no torch.tensor of numbers, no torch.no_grad.",
+    "cells = (2",
+    "z = z.detach()\n    cells = (2",
+)
+heat_map.mistake(
+    "The Gaussian's width is the argument sigma; yours is always 0.1.", "/ sigma", "/ 0.1"
+)
+heat_map.mistake(
+    "You return how little a cell is covered: H is 1 minus the product.",
+    "1 - (1 - h).prod(1, keepdim=True)",
+    "(1 - h).prod(1, keepdim=True)",
+)
+heat_map.mistake(
+    "The product of h_k is what all keypoints cover at once: take 1 minus the product of (1 - "
+    "h_k).",
+    "1 - (1 - h).prod(1, keepdim=True)",
+    "h.prod(1, keepdim=True)",
+)
+heat_map.mistake(
+    "Divide by sigma squared: the whole of d / sigma is squared.",
+    "torch.exp(-(((cells - z[..., 0, None]) / sigma) ** 2))",
+    "torch.exp(-((cells - z[..., 0, None]) ** 2) / sigma)",
+    "torch.exp(-(((cells - z[..., 1, None]) / sigma) ** 2))",
+    "torch.exp(-((cells - z[..., 1, None]) ** 2) / sigma)",
+)
+heat_map.mistake(
+    "You return the mean of the keypoints' maps: take 1 minus the product of (1 - h_k).",
+    "1 - (1 - h).prod(1, keepdim=True)",
+    "h.mean(1, keepdim=True)",
 )
 heat_map.mistake(
     "Your maps sum past 1 where keypoints overlap: Eq. 6 wants one H per image, never above 1.",
@@ -154,21 +253,52 @@ heat_map.mistake(
 )
 
 
-@exercise("5.3", "Transport (Eq. 6)")
+@exercise("5.3", "Transport (Eq. 6)", probe=gradients("transport", phi_y=1, h_y=3))
 def transport(phi_x, phi_y, h_x, h_y):
     phi_x, h_x = phi_x.detach(), h_x.detach()
     return (1 - h_x) * (1 - h_y) * phi_x + h_y * phi_y
 
 
-def _features(rng):
-    h = [torch.from_numpy(np.float32(rng.uniform(0, 1, (2, 1, 6, 6)))) for _ in range(2)]
-    return _tensor(rng, 2, 4, 6, 6), _tensor(rng, 2, 4, 6, 6), *h
+def _features(rng, ask="values"):
+    B, C, *size = (int(n) for n in rng.integers((2, 2, 4, 4), (5, 7, 10, 10)))
+    h = [torch.from_numpy(np.float32(rng.uniform(0, 1, (B, 1, *size)))) for _ in range(2)]
+    return _tensor(rng, B, C, *size), _tensor(rng, B, C, *size), *h, ask
 
 
-transport.check("features and maps anywhere", _features, points=2)
+transport.check("features and maps anywhere", _features)
 transport.check(
     "where neither frame has a keypoint, the source stays",
-    lambda rng: (*_features(rng)[:2], torch.zeros(2, 1, 6, 6), torch.zeros(2, 1, 6, 6)),
+    lambda rng: (*(f := _features(rng))[:2], 0 * f[2], 0 * f[3], f[4]),
+)
+transport.check(
+    "the gradient reaches what is pasted, and where", lambda rng: _features(rng, "gradient")
+)
+transport.mistake(
+    "The values are right, but no gradient leaves your function: y's features and its keypoints "
+    "would not learn. No detach around the whole, no numpy, no torch.no_grad.",
+    "(1 - h_x) * (1 - h_y) * phi_x + h_y * phi_y",
+    "((1 - h_x) * (1 - h_y) * phi_x + h_y * phi_y).detach()",
+)
+transport.mistake(
+    "What is cut out stays in: x's features are multiplied by (1 - H_x)(1 - H_y).",
+    "(1 - h_x) * (1 - h_y) * phi_x",
+    "phi_x",
+)
+transport.mistake(
+    "H marks where the keypoints are, 1 - H the rest: yours keeps x's features at the keypoints.",
+    "(1 - h_x) * (1 - h_y) * phi_x",
+    "h_x * h_y * phi_x",
+)
+transport.mistake(
+    "At y's keypoints y's features are added to what is left: yours takes them off.",
+    "phi_x + h_y * phi_y",
+    "phi_x - h_y * phi_y",
+)
+transport.mistake("What is pasted is missing: + H_y Phi(y).", " + h_y * phi_y", "")
+transport.mistake(
+    "What is pasted counts in full at y's keypoints: yours loses it where x has one.",
+    "+ h_y * phi_y",
+    "+ (1 - h_x) * h_y * phi_y",
 )
 transport.mistake(
     "The source is cut out at both frames' keypoints: (1 - H_x) and (1 - H_y). You forget H_y.",
@@ -201,23 +331,55 @@ transport.mistake(
 )
 
 
-@exercise("5.4", "The loss (Eq. 7), weighted")
+@exercise("5.4", "The loss (Eq. 7), weighted", probe=gradients("loss", y_hat=0))
 def loss(y_hat, y, median):
     weight = 1 + 10 * (y - median).abs().mean(1, keepdim=True)
     return (weight * (y_hat - y) ** 2).mean()
 
 
-def _images(rng):
-    return _tensor(rng, 2, 3, 8, 8), _tensor(rng, 2, 3, 8, 8), _tensor(rng, 1, 3, 8, 8)
+def _images(rng, ask="values"):
+    B, H, W = (int(n) for n in rng.integers((2, 4, 5), (5, 11, 12)))
+    return _tensor(rng, B, 3, H, W), _tensor(rng, B, 3, H, W), _tensor(rng, 1, 3, H, W), ask
 
 
-loss.check("images anywhere", _images, points=2)
+loss.check("images anywhere", _images)
 loss.check(
-    "a perfect picture costs nothing", lambda rng: ((y := _images(rng))[1], y[1].clone(), y[2])
+    "a perfect picture costs nothing", lambda rng: ((y := _images(rng))[1], y[1].clone(), *y[2:])
 )
 loss.check(
     "a frame that is the median: every pixel counts once",
-    lambda rng: ((y := _images(rng))[0], y[2].expand(2, 3, 8, 8).clone(), y[2]),
+    lambda rng: ((y := _images(rng))[0], y[2].expand(y[0].shape).clone(), *y[2:]),
+)
+loss.check("the gradient reaches the picture", lambda rng: _images(rng, "gradient"))
+loss.mistake(
+    "The values are right, but no gradient leaves your function, and nothing would learn: no "
+    "detach, no item, no numpy, no torch.no_grad.",
+    ".mean()\n",
+    ".mean().detach()\n",
+)
+loss.mistake(
+    "The weight is missing: a pixel that differs from the median counts more.", "weight * (y", "(y"
+)
+loss.mistake("The factor 10 is missing: 1 + 10 m.", "1 + 10 *", "1 +")
+loss.mistake(
+    "The loss is the mean over all entries, not their sum.",
+    "(weight * (y_hat - y) ** 2).mean()",
+    "(weight * (y_hat - y) ** 2).sum()",
+)
+loss.mistake(
+    "m is a mean over the three colours; yours is their sum.",
+    ".abs().mean(1, keepdim=True)",
+    ".abs().sum(1, keepdim=True)",
+)
+loss.mistake(
+    "m has one number a pixel; you take the mean over the whole picture, too.",
+    ".abs().mean(1, keepdim=True)",
+    ".abs().mean()",
+)
+loss.mistake(
+    "m is a mean of absolute differences, not of squares.",
+    ".abs().mean(1, keepdim=True)",
+    ".square().mean(1, keepdim=True)",
 )
 loss.mistake(
     "The weight is one number a pixel: the mean over the three colours, with the channel's "
@@ -273,16 +435,17 @@ def r2(z, truth):
     return 1 - ((A[half:] @ W - held) ** 2).sum() / ((held - held.mean()) ** 2).sum()
 
 
-def _follows(rng, noise=0.02):
-    z = rng.normal(size=(80, 3, 2))
-    return z, 40 + z.reshape(80, -1) @ rng.normal(0, 5, 6) + rng.normal(0, 50 * noise, 80)
+def _follows(rng, noise=0.02, least=30):
+    T, K = 2 * int(rng.integers(least, least + 15)), int(rng.integers(2, 6))
+    z = rng.normal(size=(T, K, 2))
+    return z, 40 + z.reshape(T, -1) @ rng.normal(0, 5, 2 * K) + rng.normal(0, 50 * noise, T)
 
 
 r2.check("keypoints that follow, with jitter", _follows, atol=1e-3)
 r2.check("keypoints that follow exactly", lambda rng: _follows(rng, 0), atol=1e-3)
 r2.check(
     "keypoints that know nothing",
-    lambda rng: (rng.normal(size=(60, 2, 2)), rng.normal(size=60)),
+    lambda rng: ((z := _follows(rng)[0]), rng.normal(size=len(z))),
     atol=1e-3,
 )
 r2.mistake(
@@ -327,6 +490,25 @@ r2.mistake(
     "The map needs a constant: append a column of ones.",
     "np.ones((len(z), 1))",
     "np.zeros((len(z), 1))",
+)
+r2.mistake(
+    "Judge on the second half: yours is fitted on the second and judged on the first.",
+    "A[:half], truth[:half]",
+    "A[half:], truth[half:]",
+    "truth[half:]\n",
+    "truth[:half]\n",
+    "((A[half:] @ W",
+    "((A[:half] @ W",
+)
+r2.mistake(
+    "Sums above and below, or means above and below: yours mixes them.",
+    "((A[half:] @ W - held) ** 2).sum()",
+    "((A[half:] @ W - held) ** 2).mean()",
+)
+r2.mistake(
+    "Square the errors, and the spread, too.",
+    "((A[half:] @ W - held) ** 2).sum() / ((held - held.mean()) ** 2).sum()",
+    "np.abs(A[half:] @ W - held).sum() / np.abs(held - held.mean()).sum()",
 )
 r2.mistake("R^2 is 1 minus the share of the variance that is left.", "return 1 - (", "return (")
 r2.mistake(

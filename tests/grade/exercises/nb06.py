@@ -10,23 +10,54 @@ def _walk(rng, n, K=5):
     return np.cumsum(rng.normal(0.02, 0.05, (n, K, 2)), axis=0)
 
 
+def _any_walk(rng):
+    return _walk(rng, int(rng.integers(8, 22)), int(rng.integers(2, 8)))
+
+
 @exercise("6.1", "The nearest frame, r1 (Eq. 9)")
 def r1(z, z_E):
     distances = np.sqrt(((z_E[:-1] - z) ** 2).sum(axis=(1, 2)))
     return -distances.min()
 
 
-r1.check("keypoints anywhere", lambda rng: (rng.normal(size=(5, 2)), _walk(rng, 20)))
+r1.check("keypoints anywhere", lambda rng: (rng.normal(size=(z := _any_walk(rng))[0].shape), z))
 r1.check(
     "at a frame of the demonstration it is 0",
-    lambda rng: ((z := _walk(rng, 12))[rng.integers(11)], z),
+    lambda rng: ((z := _any_walk(rng))[rng.integers(len(z) - 1)], z),
 )
 r1.check(
-    "at its first frame, too: p begins at 1, z_E[0]", lambda rng: ((z := _walk(rng, 12))[0], z)
+    "at its first frame, too: p begins at 1, z_E[0]", lambda rng: ((z := _any_walk(rng))[0], z)
 )
 r1.check(
     "at the last frame it is not: p ends at N - 1",
-    lambda rng: ((z := _walk(rng, 12))[-1] + 1, z + 1),
+    lambda rng: ((z := _any_walk(rng))[-1] + 1, z + 1),
+)
+r1.mistake(
+    "Take the minimum of the distances; yours is the largest.",
+    "-distances.min()",
+    "-distances.max()",
+)
+r1.mistake(
+    "The differences are squared before they are added up; yours are absolute values.",
+    "np.sqrt(((z_E[:-1] - z) ** 2).sum(axis=(1, 2)))",
+    "np.abs(z_E[:-1] - z).sum(axis=(1, 2))",
+)
+r1.mistake(
+    "You return which frame is nearest; the reward is how near it is.",
+    "-distances.min()",
+    "-distances.argmin()",
+)
+r1.mistake(
+    "You return which frame is nearest; the reward is how near it is.",
+    "-distances.min()",
+    "distances.argmin()",
+)
+r1.mistake("One number: the minimum over p is missing.", "-distances.min()", "-distances")
+r1.mistake(
+    "The norm is one length of all 2K numbers, each frame's own: sum over axes 1 and 2; yours goes "
+    "over the frames, too.",
+    "np.sqrt(((z_E[:-1] - z) ** 2).sum(axis=(1, 2)))",
+    "np.sqrt(((z_E[:-1] - z) ** 2).sum())",
 )
 r1.mistake(
     "A reward is larger when the robot is nearer: Eq. 9 has a minus in front.",
@@ -72,15 +103,41 @@ def r2(z, z_next, z_E):
 
 r2.check(
     "keypoints anywhere",
-    lambda rng: (rng.normal(size=(5, 2)), rng.normal(size=(5, 2)), _walk(rng, 20)),
+    lambda rng: (*rng.normal(size=(2, *(z := _any_walk(rng))[0].shape)), z),
 )
 r2.check(
     "a step of the demonstration, made elsewhere, earns 0",
-    lambda rng: ((z := _walk(rng, 12))[4] + 3, z[5] + 3, z),
+    lambda rng: ((z := _any_walk(rng))[q := rng.integers(len(z) - 2)] + 3, z[q + 1] + 3, z),
 )
 r2.check(
     "so does its last step: q = N - 1 leads to the last frame",
-    lambda rng: ((z := _walk(rng, 12))[-2] + 3, z[-1] + 3, z),
+    lambda rng: ((z := _any_walk(rng))[-2] + 3, z[-1] + 3, z),
+)
+r2.mistake(
+    "Your distance is squared: Eq. 10 has the norm, with its square root.",
+    "-np.sqrt(((steps - step) ** 2).sum(axis=(1, 2))).min()",
+    "-((steps - step) ** 2).sum(axis=(1, 2)).min()",
+)
+r2.mistake(
+    "You add up one distance per keypoint: the norm goes over all K keypoints and both coordinates "
+    "at once.",
+    "np.sqrt(((steps - step) ** 2).sum(axis=(1, 2)))",
+    "np.sqrt(((steps - step) ** 2).sum(axis=2)).sum(axis=1)",
+)
+r2.mistake(
+    "You take the mean distance of a keypoint: the norm is one length of all 2K numbers.",
+    "np.sqrt(((steps - step) ** 2).sum(axis=(1, 2)))",
+    "np.sqrt(((steps - step) ** 2).sum(axis=2)).mean(axis=1)",
+)
+r2.mistake(
+    "You leave out the first step, from z_E[0] to z_E[1].",
+    "z_E[1:] - z_E[:-1]",
+    "z_E[2:] - z_E[1:-1]",
+)
+r2.mistake(
+    "The demonstration's steps have the opposite sign: z^E_{q+1} - z^E_q.",
+    "z_E[1:] - z_E[:-1]",
+    "z_E[:-1] - z_E[1:]",
 )
 r2.mistake("A step is z_{t+1} - z_t; yours has the opposite sign.", "z_next - z", "z - z_next")
 r2.mistake(
@@ -124,8 +181,40 @@ def episode_return(z, z_E, lam1, lam2):
     return total
 
 
-episode_return.check("a random episode", lambda rng: (_walk(rng, 15), _walk(rng, 20), 1.0, 1.0))
-episode_return.check("other weights", lambda rng: (_walk(rng, 9), _walk(rng, 20), 0.3, 2.5))
+def _episode(rng, *weights):
+    K, T, N = (int(n) for n in rng.integers((2, 6, 8), (7, 18, 22)))
+    return _walk(rng, T, K), _walk(rng, N, K), *weights
+
+
+episode_return.check("a random episode", lambda rng: _episode(rng, 1.0, 1.0))
+episode_return.check(
+    "other weights",
+    lambda rng: _episode(rng, float(rng.uniform(0.1, 0.8)), float(rng.uniform(1.5, 3))),
+)
+episode_return.mistake(
+    "z_{t+1} is the robot's next frame, z[t + 1]: r2 judges its own step.",
+    "r2(z[t], z[t + 1], z_E)",
+    "r2(z[t + 1], z[t], z_E)",
+)
+episode_return.mistake(
+    "Only the first part: lambda_r2 r_2 is missing.", " + lam2 * r2(z[t], z[t + 1], z_E)", ""
+)
+episode_return.mistake(
+    "Only the second part: lambda_r1 r_1 is missing.", "lam1 * r1(z[t], z_E) + ", ""
+)
+episode_return.mistake(
+    "Add up over all transitions: yours is what the last one earns.", "total +=", "total ="
+)
+episode_return.mistake(
+    "Begin with the first transition, t = 0: you leave it out.",
+    "range(len(z) - 1)",
+    "range(1, len(z) - 1)",
+)
+episode_return.mistake(
+    "The robot's episode has T frames; you count those of the demonstration.",
+    "range(len(z) - 1)",
+    "range(len(z_E) - 1)",
+)
 episode_return.check(
     "a robot that never moves beside a demonstration that starts at rest",
     lambda rng: (
@@ -178,8 +267,16 @@ def trim(z, least):
 
 
 def _with_pauses(rng):
-    z = np.repeat(_walk(rng, 10), rng.integers(1, 5, 10), axis=0)
-    return z + rng.normal(0, 1e-3, z.shape), 0.05
+    n, K = (int(k) for k in rng.integers((8, 2), (13, 8)))
+    z = np.repeat(_walk(rng, n, K), rng.integers(1, 5, n), axis=0)
+    return z + rng.normal(0, 1e-3, z.shape), float(rng.uniform(0.03, 0.08))
+
+
+def _trembling(rng):
+    """A keypoint that swings between two places nearer than `least`, and at last walks away."""
+    least, swings = float(rng.uniform(0.1, 0.3)), int(rng.integers(10, 20))
+    x = np.append(np.arange(swings) % 2 * rng.uniform(0.4, 0.9), np.arange(1.5, 4, 0.6))
+    return x[:, None, None] * least * np.array([[0.6, 0.8]]), least
 
 
 def _slow(rng):
@@ -196,12 +293,45 @@ trim.check(
     "slow motion is kept where it adds up",
     lambda rng: (_slow(rng), rng.uniform(0.15, 0.4)),
 )
-trim.check("where nothing rests, every frame stays, once", lambda rng: (_walk(rng, 10), 0.01))
+trim.check("where nothing rests, every frame stays, once", lambda rng: (_any_walk(rng), 1e-3))
+trim.check("trembling on the spot is rest, however long the way", _trembling)
 trim.check(
     "a frame exactly `least` away stays",
     lambda rng: (0.5 * np.arange(rng.integers(6, 12))[:, None, None] * np.array([[1.0, 0.0]]), 0.5),
 )
-trim.check("first and last frame stay", lambda rng: (_rest(rng), 0.1))
+trim.check(
+    "first and last frame stay",
+    lambda rng: (_rest(rng), float(rng.uniform(0.05, 0.2))),
+)
+trim.mistake(
+    "The distance counts, not the length of the way since the last frame you kept: what trembles "
+    "on the spot rests.",
+    "    kept = [0]\n",
+    "    kept = [0]\n    way = np.insert(np.cumsum(np.sqrt((np.diff(z, axis=0) ** 2)"
+    ".sum((1, 2)))), 0, 0.0)\n",
+    "np.linalg.norm(z[i] - z[kept[-1]])",
+    "way[i] - way[kept[-1]]",
+)
+trim.mistake(
+    "The first frame stays: begin with it.",
+    "    kept = [0]\n",
+    "    kept = []\n",
+    "np.linalg.norm(z[i] - z[kept[-1]])",
+    "np.linalg.norm(z[i] - z[kept[-1] if kept else 0])",
+)
+trim.mistake(
+    "Return the frames, not their numbers.", "z[kept + [len(z) - 1]]", "kept + [len(z) - 1]"
+)
+trim.mistake(
+    "Take the norm of all 2K numbers: your distance is squared.",
+    "np.linalg.norm(z[i] - z[kept[-1]])",
+    "((z[i] - z[kept[-1]]) ** 2).sum()",
+)
+trim.mistake(
+    "The distance is the length of all 2K numbers; you take the mean over the keypoints.",
+    "np.linalg.norm(z[i] - z[kept[-1]])",
+    "np.linalg.norm(z[i] - z[kept[-1]], axis=1).mean()",
+)
 trim.mistake(
     "Compare with the last frame you kept, not with the one before: slow motion would vanish as a "
     "whole.",
@@ -242,15 +372,24 @@ def timed_r1(z_next, z_E, t):
 
 
 timed_r1.check(
-    "on the way", lambda rng: (rng.normal(size=(5, 2)), _walk(rng, 20), int(rng.integers(18)))
+    "on the way",
+    lambda rng: (
+        rng.normal(size=(z := _any_walk(rng))[0].shape),
+        z,
+        int(rng.integers(len(z) - 2)),
+    ),
 )
 timed_r1.check(
     "at t = N - 1 its end has just passed",
-    lambda rng: (rng.normal(size=(5, 2)), (z := _walk(rng, int(rng.integers(5, 20)))), len(z) - 1),
+    lambda rng: (rng.normal(size=(z := _any_walk(rng))[0].shape), z, len(z) - 1),
 )
 timed_r1.check(
     "after the end the goal stays the goal",
-    lambda rng: (rng.normal(size=(5, 2)), _walk(rng, 20), int(rng.integers(19, 37))),
+    lambda rng: (
+        rng.normal(size=(z := _any_walk(rng))[0].shape),
+        z,
+        len(z) + int(rng.integers(0, 20)),
+    ),
 )
 timed_r1.mistake(
     "After step t the demonstration is at frame t + 1: the robot would always be a step late.",
@@ -266,6 +405,31 @@ timed_r1.mistake(
     "Frames count from 0, so the last is N - 1, the goal; yours stops one before.",
     "min(t + 1, len(z_E) - 1)",
     "min(t + 1, len(z_E) - 2)",
+)
+timed_r1.mistake(
+    "After its end the demonstration stays at its last frame: z_E[t + 1] is none any more.",
+    "min(t + 1, len(z_E) - 1)",
+    "t + 1",
+)
+timed_r1.mistake(
+    "Your distance is squared: it is the norm, with its square root.",
+    "-np.linalg.norm(z_next - target)",
+    "-((z_next - target) ** 2).sum()",
+)
+timed_r1.mistake(
+    "You take the mean distance of a keypoint: the norm is one length of all 2K numbers.",
+    "np.linalg.norm(z_next - target)",
+    "np.linalg.norm(z_next - target, axis=1).mean()",
+)
+timed_r1.mistake(
+    "The goal is at the end of the way, not all along: ask for the frame of the time, t + 1.",
+    "min(t + 1, len(z_E) - 1)",
+    "-1",
+)
+timed_r1.mistake(
+    "After step t the demonstration is at frame t + 1; yours is two frames on.",
+    "min(t + 1, len(z_E) - 1)",
+    "min(t + 2, len(z_E) - 1)",
 )
 timed_r1.mistake(
     "You add up one distance per keypoint: the distance is the length of all 2K numbers, as in "

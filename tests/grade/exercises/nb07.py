@@ -12,6 +12,22 @@ def stopping(v, mu):
 
 
 stopping.check("a puck on the kit's table", lambda rng: (float(rng.uniform(0.3, 1.5)), 0.1))
+stopping.mistake("The friction is the argument, not always 0.1.", "g = 9.81", "g, mu = 9.81, 0.1")
+stopping.mistake(
+    "The time is v / (mu g): the 2 belongs to the distance alone.",
+    "v / (mu * g)",
+    "v / (2 * mu * g)",
+)
+stopping.mistake(
+    "More friction stops it sooner: mu stands in the denominator.",
+    "v**2 / (2 * mu * g), v / (mu * g)",
+    "v**2 * mu / (2 * g), v * mu / g",
+)
+stopping.mistake(
+    "The time goes with the speed itself, v / (mu g), not with its square.",
+    "v / (mu * g)",
+    "v**2 / (mu * g)",
+)
 stopping.check(
     "other friction", lambda rng: (float(rng.uniform(0.3, 3)), float(rng.uniform(0.05, 0.8)))
 )
@@ -53,7 +69,25 @@ def _shot(rng):
 speeds.check("targets in reach of a hit", _shot)
 speeds.check(
     "so near that no hit at all is right, too",
-    lambda rng: (0.03, 0.05, float(rng.uniform(0.05, 0.5))),
+    lambda rng: (
+        float(rng.uniform(0.01, 0.05)),
+        float(rng.uniform(0.06, 0.12)),
+        float(rng.uniform(0.05, 0.5)),
+    ),
+)
+speeds.mistake("The slack is the argument, not always 5 cm.", "g = 9.81", "g, slack = 9.81, 0.05")
+speeds.mistake("The friction is the argument, not always 0.1.", "g = 9.81", "g, mu = 9.81, 0.1")
+speeds.mistake(
+    "Where the slack is larger than the way, the lowest speed is 0; yours takes the way's size, "
+    "whatever its sign.",
+    "max(low, 0)",
+    "abs(low)",
+)
+speeds.mistake("Friction slows by mu times g: gravity is missing.", "g = 9.81", "g = 1.0")
+speeds.mistake(
+    "Return two speeds, the lowest and the highest: yours is the one for `distance`.",
+    "return np.sqrt(2 * mu * g * max(low, 0)), np.sqrt(2 * mu * g * high)",
+    "return np.sqrt(2 * mu * g * distance)",
 )
 speeds.mistake(
     "You take the slack as a slack of speed: find the nearest and the farthest place, then their "
@@ -90,7 +124,7 @@ def friction(x, dt):
 
 
 def _track(rng, noise=0.0, most=0.3):
-    mu, v, dt = rng.uniform(0.05, most), rng.uniform(0.8, 1.5), 0.04
+    mu, v, dt = rng.uniform(0.05, most), rng.uniform(0.8, 1.5), float(rng.uniform(0.02, 0.06))
     t = dt * np.arange(int(0.8 * v / (mu * 9.81) / dt) + 4)
     t = t[t < v / (mu * 9.81)]
     x = rng.uniform(0.4, 0.6) + v * t - mu * 9.81 * t**2 / 2
@@ -108,6 +142,10 @@ friction.mistake(
     "x = x0 + v t - (1/2) mu g t^2: the coefficient of t^2 is half the deceleration.",
     "-2 * np",
     "-np",
+)
+friction.mistake("Frames are dt apart, not always 0.04 s.", "dt * np", "0.04 * np")
+friction.mistake(
+    "np.polyfit returns the highest power first: that of t^2 is [0].", "t, x, 2)[0]", "t, x, 2)[1]"
 )
 friction.mistake("The track bends down: the sign of your mu is wrong.", "-2 * np", "2 * np")
 friction.mistake(
@@ -143,38 +181,67 @@ def solved(x, target, dt):
     return (np.abs(x[1:] - target) < 0.05) & (speed < 0.02)
 
 
-def _stop(rng, end, drift=0.0):
-    t = np.linspace(0, 1, 40)
-    return end - 0.4 * (1 - t) ** 2 + drift * t * 40 * 0.04, 0.94, 0.04
+def _where(rng):
+    """A target (m) and the time between frames (s)."""
+    return float(rng.uniform(0.5, 1.5)), float(rng.uniform(0.02, 0.06))
+
+
+def _stop(rng, off):
+    """A puck that comes to rest `off` the target."""
+    target, dt = _where(rng)
+    t = np.linspace(0, 1, int(1 / dt) + int(rng.integers(15, 25)))
+    return target + off - 0.4 * (1 - t) ** 2, target, dt
+
+
+def _across(rng, turns=False):
+    """One that slides across the target, and back if it turns."""
+    target, dt = _where(rng)
+    way = rng.uniform(0.6, 0.9) * dt * np.arange(-rng.integers(15, 20), rng.integers(16, 24))
+    return target - (np.abs(way) - 0.1 if turns else -way), target, dt
+
+
+def _hit_away(rng):
+    target, dt = _where(rng)
+    x = target + rng.uniform(-0.04, 0.04)
+    rest, away = np.full(rng.integers(5, 10), x), np.linspace(x, x + 0.5, rng.integers(15, 30))
+    return np.concatenate([rest, away]), target, dt
+
+
+def _creeps(rng):
+    """At 1 cm/s across the target, from 6 cm before it."""
+    target, dt = _where(rng)
+    return target - 0.06 - rng.uniform(0, 0.01) + 0.01 * dt * np.arange(int(13 / dt)), target, dt
 
 
 solved.check(
     "a puck that comes to rest at the target",
-    lambda rng: _stop(rng, 0.94 + rng.uniform(-0.045, 0.045)),
+    lambda rng: _stop(rng, rng.uniform(-0.045, 0.045)),
 )
 solved.check(
     "one that rests elsewhere",
-    lambda rng: _stop(rng, 0.94 + rng.choice([-1, 1]) * rng.uniform(0.06, 0.2)),
+    lambda rng: _stop(rng, rng.choice([-1, 1]) * rng.uniform(0.06, 0.2)),
 )
-solved.check(
-    "one that slides across the target and on",
-    lambda rng: (0.5 + rng.uniform(0.6, 0.9) * 0.04 * np.arange(30), 0.94, 0.04),
+solved.check("one that slides across the target and on", _across)
+solved.check("one that slides across and back", lambda rng: _across(rng, turns=True))
+solved.check("one that rests at the target and is hit away", _hit_away)
+solved.check("one that creeps in at 1 cm/s, and out on the other side", _creeps)
+solved.mistake("The target is the argument, not always 0.94.", "- target", "- 0.94")
+solved.mistake("Frames are dt apart, not always 0.04 s.", "/ dt", "/ 0.04")
+solved.mistake(
+    "An answer for every step, T - 1 of them: yours says whether it was solved at all.",
+    "return (np.abs(x[1:] - target) < 0.05) & (speed < 0.02)",
+    "return ((np.abs(x[1:] - target) < 0.05) & (speed < 0.02)).any()",
 )
-solved.check(
-    "one that slides across and back",
-    lambda rng: (1.2 - rng.uniform(0.6, 0.9) * 0.04 * np.abs(np.arange(-20, 21)), 0.94, 0.04),
+solved.mistake("A speed is way by time: divide by dt, do not multiply.", "/ dt", "* dt")
+solved.mistake(
+    "Near is within 0.05 m, slow is below 0.02 m/s: your two bounds are swapped.",
+    "< 0.05) & (speed < 0.02)",
+    "< 0.02) & (speed < 0.05)",
 )
-solved.check(
-    "one that rests at the target and is hit away",
-    lambda rng: (
-        np.concatenate([np.full(8, x := 0.94 + rng.uniform(-0.04, 0.04)), np.linspace(x, 1.4, 30)]),
-        0.94,
-        0.04,
-    ),
-)
-solved.check(
-    "one that creeps in at 1 cm/s, and out on the other side",
-    lambda rng: (0.88 + rng.uniform(0, 0.01) + 0.01 * 0.04 * np.arange(320), 0.94, 0.04),
+solved.mistake(
+    "A resting puck counts where it is near the target: you look at the speed alone.",
+    "(np.abs(x[1:] - target) < 0.05) & (speed < 0.02)",
+    "speed < 0.02",
 )
 solved.mistake("A step is dt seconds: divide the way by it to get a speed in m/s.", " / dt", "")
 solved.mistake(

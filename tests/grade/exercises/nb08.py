@@ -5,8 +5,9 @@ import numpy as np
 from tests.grade.exercise import exercise
 
 
-def _video(rng, T=9, H=10, W=12):
+def _video(rng):
     """Mostly a still picture, with something that moves across it."""
+    T, H, W = (int(n) for n in rng.integers((8, 9, 12), (12, 13, 17)))
     frames = np.repeat(rng.integers(30, 220, (1, H, W, 3)), T, axis=0)
     for t in range(T):
         frames[t, 2:6, t : t + 3] = rng.integers(0, 256, 3)
@@ -20,9 +21,34 @@ def foreground(video, threshold):
 
 
 foreground.check("something crosses a still picture", lambda rng: (_video(rng), 20.0))
+foreground.mistake("The threshold is the argument, not always 20.", "> threshold", "> 20")
+foreground.mistake(
+    "Foreground is what differs by more than the threshold; yours is the rest.",
+    "> threshold",
+    "< threshold",
+)
+foreground.mistake("One truth value a pixel: you return how much it differs.", " > threshold", "")
+foreground.mistake(
+    "The mean over the three colours decides, not their sum.",
+    ".mean(-1) > threshold",
+    ".sum(-1) > threshold",
+)
+foreground.mistake(
+    "Compare with the median over time, the picture without what passes; you compare with the "
+    "first frame.",
+    "np.median(video, axis=0)",
+    "video[0]",
+)
+foreground.mistake(
+    "Compare with the median over time, the picture without what passes; you compare with the "
+    "frame before.",
+    "np.median(video, axis=0)",
+    "np.concatenate([video[:1], video[:-1]])",
+)
 foreground.check("another threshold", lambda rng: (_video(rng), float(rng.uniform(5, 60))))
 foreground.check(
-    "darker than the background counts as well", lambda rng: (255 - _video(rng) // 2, 15.0)
+    "darker than the background counts as well",
+    lambda rng: (255 - _video(rng) // 2, float(rng.uniform(10, 25))),
 )
 foreground.mistake(
     "uint8 has no negative numbers: 10 - 20 is 246. Turn the video into floats first.",
@@ -77,14 +103,31 @@ def share_inside(video, mask):
 
 
 def _masked(rng):
-    video, mask = _video(rng), np.zeros((10, 12), bool)
+    video = _video(rng)
+    mask = np.zeros(video.shape[1:3], bool)
     mask[rng.integers(4) :, : rng.integers(4, 10)] = True
     return video, mask
 
 
 share_inside.check("any region", _masked, points=2)
 share_inside.check(
-    "the whole picture holds all of it", lambda rng: (_video(rng), np.ones((10, 12), bool))
+    "the whole picture holds all of it",
+    lambda rng: (v := _video(rng), np.ones(v.shape[1:3], bool)),
+)
+share_inside.mistake(
+    "You return the energy inside; the share is that divided by all of it.",
+    "energy[mask].sum() / energy.sum()",
+    "energy[mask].sum()",
+)
+share_inside.mistake(
+    "How much moves inside counts, not how large the mask is.",
+    "energy[mask].sum() / energy.sum()",
+    "mask.mean()",
+)
+share_inside.mistake(
+    "A share lies between 0 and 1; yours is per cent.",
+    "energy[mask].sum() / energy.sum()",
+    "100 * energy[mask].sum() / energy.sum()",
 )
 share_inside.mistake(
     "uint8 has no negative numbers: a pixel that gets darker by 1 counts as 255. Use floats.",
@@ -135,7 +178,20 @@ highest_push.check(
     "any mug", lambda rng: (float(rng.uniform(0.02, 0.05)), float(rng.uniform(0.1, 1)))
 )
 highest_push.check(
-    "a smooth table lets you push anywhere", lambda rng: (0.03, float(rng.uniform(0.01, 0.05)))
+    "a smooth table lets you push anywhere",
+    lambda rng: (float(rng.uniform(0.02, 0.05)), float(rng.uniform(0.01, 0.05))),
+)
+highest_push.mistake("You divide the wrong way round: r / mu.", "radius / mu", "mu / radius")
+highest_push.mistake("The mug's foot is the argument, not always 3 cm.", "radius / mu", "0.03 / mu")
+highest_push.mistake(
+    "The weight m g stands on both sides and drops out: gravity is not in the answer.",
+    "radius / mu",
+    "radius * 9.81 / mu",
+)
+highest_push.mistake(
+    "The weight m g stands on both sides and drops out: gravity is not in the answer.",
+    "radius / mu",
+    "radius / (mu * 9.81)",
 )
 highest_push.mistake(
     "A rougher table makes it tip sooner: divide by mu.", "radius / mu", "radius * mu"
@@ -158,12 +214,32 @@ def disturbance(z_a, z_b, size):
 
 
 def _pair(rng):
-    z = rng.uniform(-1, 1, (12, 5, 2))
-    return z, z + rng.normal(0, 0.03, z.shape), 84
+    z = rng.uniform(-1, 1, (*rng.integers((6, 2), (18, 8)), 2))
+    return z, z + rng.normal(0, 0.03, z.shape), int(rng.integers(40, 250))
 
 
 disturbance.check("two videos that differ a little", _pair, points=2)
-disturbance.check("two equal ones", lambda rng: ((z := _pair(rng)[0]), z.copy(), 84))
+disturbance.check("two equal ones", lambda rng: ((p := _pair(rng))[0], p[0].copy(), p[2]))
+disturbance.mistake("The picture's width is `size`, not always 84.", "* size", "* 84")
+disturbance.mistake(
+    "One number a keypoint: the mean goes over frames, axis 0; yours goes over the keypoints.",
+    ".mean(0)",
+    ".mean(1)",
+)
+disturbance.mistake("The mean over the frames, not their sum.", ".mean(0)", ".sum(0)")
+disturbance.mistake(
+    "In pixels: 2 units of z are `size` pixels; yours are units of z.", " * size / 2", ""
+)
+disturbance.mistake(
+    "A distance is the norm, with its root: yours is squared.",
+    "np.linalg.norm(z_a - z_b, axis=-1)",
+    "((z_a - z_b) ** 2).sum(-1)",
+)
+disturbance.mistake(
+    "Take each frame's distance, then the mean; yours is the root of the mean square.",
+    "np.linalg.norm(z_a - z_b, axis=-1).mean(0)",
+    "np.sqrt(((z_a - z_b) ** 2).sum(-1).mean(0))",
+)
 disturbance.mistake(
     "From -1 to 1 are 2 units over `size` pixels: half of size for each.", "* size / 2", "* size"
 )

@@ -13,8 +13,9 @@ from tests.grade.exercise import exercise
     probe="""
     import pybullet as p
 
-    def probe(force, friction, seconds):
-        other = p.connect(p.DIRECT)  # a call without physicsClientId=client goes there
+    def probe(force, friction, seconds, worlds):
+        # A call without physicsClientId=client goes to the first of them.
+        others = [p.connect(p.DIRECT) for _ in range(worlds)]
         client = p.connect(p.DIRECT)
         try:
             p.setTimeStep(1 / 250, client)
@@ -32,8 +33,8 @@ from tests.grade.exercise import exercise
             size = np.subtract(high, low)
             return {"joint": np.array(q), "mass": mass, "size": size, "shapes of the base": parts}
         finally:
-            p.disconnect(client)
-            p.disconnect(other)
+            for world in (client, *others):
+                p.disconnect(world)
     """,
 )
 def make_drawer(client, friction):
@@ -65,7 +66,8 @@ def make_drawer(client, friction):
 
 def _push(rng, least, most, seconds):
     friction = float(rng.uniform(12, 24))
-    return friction + float(rng.uniform(least, most)), friction, seconds
+    force = friction + float(rng.uniform(least, most))
+    return force, friction, seconds, int(rng.integers(1, 4))
 
 
 make_drawer.check(
@@ -146,7 +148,33 @@ def _seen(rng, K=5):
 
 
 observe.check("five keypoints", _seen)
-observe.check("any number of them", lambda rng: _seen(rng, 3))
+observe.check("any number of them", lambda rng: _seen(rng, 2 * int(rng.integers(1, 5))))
+observe.mistake(
+    "The second step is missing: how it moved in the step before.",
+    "*steps, (",
+    "steps[0], (",
+)
+observe.mistake("z_t itself is missing: it comes first.", "[z.ravel(), *steps", "[*steps")
+observe.mistake(
+    "The newer step comes first, then the one before; yours are the other way round.",
+    "(z - z_1).ravel(), (z_1 - z_2).ravel()",
+    "(z_1 - z_2).ravel(), (z - z_1).ravel()",
+)
+observe.mistake(
+    "Steps, not places: what moved is z_t - z_{t-1}, not z_{t-1} itself.",
+    "(z - z_1).ravel(), (z_1 - z_2).ravel()",
+    "z_1.ravel(), z_2.ravel()",
+)
+observe.mistake(
+    "One vector, all numbers in a row; yours still has rows.",
+    "return np.concatenate([z.ravel(), *steps, (target - z).ravel(), [clock]])",
+    "return np.stack([z, z - z_1, z_1 - z_2, target - z])",
+)
+observe.mistake(
+    "x and y of keypoint 1, then of keypoint 2: yours has all x first.",
+    "z_2, z_1, z = recent",
+    "z_2, z_1, z = (a.T for a in recent)\n    target = target.T",
+)
 observe.mistake(
     "How the keypoints moved is z_t - z_{t-1}; yours has the opposite sign.",
     "(z - z_1).ravel(), (z_1 - z_2).ravel()",
@@ -255,6 +283,32 @@ learn_by_watching.mistake(
     "robot",
 )
 learn_by_watching.mistake(
+    "The human's frames are translated; the robot's need no translation: yours are swapped.",
+    "detect(translate(demo))",
+    "detect(demo)",
+    "detect(robot)",
+    "detect(translate(robot))",
+)
+learn_by_watching.mistake(
+    "The reward follows the human's video: you pass the robot's motion twice.",
+    "make_reward(z_E, detect(robot))",
+    "make_reward(detect(robot), detect(robot))",
+)
+learn_by_watching.mistake(
+    "make_reward needs keypoints of random robot motion for the pace: you pass the "
+    "demonstration's.",
+    "make_reward(z_E, detect(robot))",
+    "make_reward(z_E, z_E)",
+)
+learn_by_watching.mistake(
+    "The policy is what training returns: you return nothing.", "return train", "train"
+)
+learn_by_watching.mistake(
+    "Keypoints are missing: the translated frames go through `detect`.",
+    "detect(translate(demo))",
+    "translate(demo)",
+)
+learn_by_watching.mistake(
     "Return what `train` returns: the policy.", "return train(reward)", "return reward"
 )
 
@@ -281,10 +335,28 @@ def _episodes(rng, n=10):
 
 
 evaluate.check("ten episodes", _episodes)
-evaluate.check("forty episodes", lambda rng: _episodes(rng, 40))
+evaluate.check("any number of episodes", lambda rng: _episodes(rng, int(rng.integers(15, 45))))
+evaluate.mistake("The number of episodes is n, not always 10.", "range(n)", "range(10)")
+evaluate.mistake(
+    "The first test seed is 1,000,000 itself: yours begin one later.",
+    "1_000_000 + i",
+    "1_000_001 + i",
+)
+evaluate.mistake(
+    "Return how many were solved; you stop at the first.",
+    "sum(any(play(1_000_000 + i)) for i in range(n))",
+    "int(any(any(play(1_000_000 + i)) for i in range(n)))",
+)
+evaluate.mistake(
+    "A list of truth values is true as soon as it is not empty: ask whether any of them is.",
+    "sum(any(play(1_000_000 + i))",
+    "sum(bool(play(1_000_000 + i))",
+)
 evaluate.check(
     "done at the last step alone",
-    lambda rng: (np.pad(np.zeros((6, 11), bool), ((0, 0), (0, 1)), constant_values=True),),
+    lambda rng: (
+        np.pad(np.zeros((rng.integers(5, 9), 11), bool), ((0, 0), (0, 1)), constant_values=True),
+    ),
 )
 evaluate.mistake(
     "Success counts at any step of the episode; you ask for the last one.",

@@ -4,10 +4,19 @@ import math
 
 import numpy as np
 
-from tests.grade.exercise import exercise
+from tests.grade.exercise import different, exercise
 
 
-@exercise("10.1", "The Wilson interval")
+@exercise(
+    "10.1",
+    "The Wilson interval",
+    probe="""
+    def probe(wins, n):
+        if isinstance(n, int):
+            return wilson(wins, n)
+        return [wilson(k, m) for k, m in zip(wins, n, strict=True)]
+    """,
+)
 def wilson(wins, n):
     z = 1.96
     p = wins / n
@@ -21,8 +30,59 @@ def _count(rng):
     return int(rng.integers(0, n + 1)), n
 
 
-wilson.check("any number of episodes", _count, points=2)
+def _extremes(rng):
+    """None of n and n of n: where the ends leave 0 to 1 by rounding, if nobody cuts them off."""
+    n = [int(k) for k in rng.permutation(np.arange(1, 120))]
+    return [0] * len(n) + n, n + n
+
+
+def _between(got, args):
+    if not isinstance(got, list) or len(got) != len(args[0]):
+        return different(got, [(0.0, 1.0)] * len(args[0]), wilson.checks[0])
+    right = wilson.run(wilson.source)(args)
+    for k, n, ends, want in zip(*args, got, right, strict=True):
+        if wrong := different(ends, want, wilson.checks[0]):
+            return f"{k} of {n}: {wrong}"
+        low, high = ends
+        if low < 0 or high > 1:
+            return f"{k} of {n} gives {low!r} to {high!r}: cut off what lies outside 0 to 1"
+    return None
+
+
+wilson.check("any number of episodes", _count)
 wilson.check("ten of ten, and none of ten", lambda rng: (int(rng.choice([0, 10])), 10))
+wilson.check("at the very ends it stays between 0 and 1", _extremes, trials=1, verify=_between)
+wilson.mistake(
+    "Rounding leads out of 0 to 1 at times: cut it off, max(0, ...) and min(1, ...).",
+    "max(0.0, centre - half), min(1.0, centre + half)",
+    "centre - half, centre + half",
+)
+wilson.mistake(
+    "The square root is missing.",
+    "math.sqrt(p * (1 - p) / n + z**2 / (4 * n**2))",
+    "(p * (1 - p) / n + z**2 / (4 * n**2))",
+)
+wilson.mistake("In front of the root stands z.", "half = z * math.sqrt", "half = math.sqrt")
+wilson.mistake(
+    "p is the share, wins / n; yours is the number of wins.",
+    "p = wins / n",
+    "p = wins",
+    "p * (1 - p) / n",
+    "abs(p * (1 - p)) / n",
+)
+wilson.mistake("p (1 - p) is divided by n under the root.", "p * (1 - p) / n", "p * (1 - p)")
+wilson.mistake(
+    "z is squared in the centre and in the denominator, z^2 / n.",
+    "z**2 / (2 * n)",
+    "z / (2 * n)",
+    "(1 + z**2 / n)",
+    "(1 + z / n)",
+)
+wilson.mistake(
+    "The centre is p + z^2 / (2 n), over 1 + z^2 / n: yours leaves it at p.",
+    "(p + z**2 / (2 * n)) / (1 + z**2 / n)",
+    "p",
+)
 wilson.mistake(
     "That is the interval of the normal curve: it says 1.00 to 1.00 for ten of ten.",
     "(p + z**2 / (2 * n)) / (1 + z**2 / n)",
@@ -89,6 +149,26 @@ chance.mistake(
     "comb(n, k)",
 )
 chance.mistake(
+    "The others fail, with probability 1 - p each: (1 - p)^(n - i) is missing.",
+    " * (1 - p) ** (n - i)",
+    "",
+)
+chance.mistake(
+    "p belongs to the wins, 1 - p to the others: yours are exchanged.",
+    "p**i * (1 - p) ** (n - i)",
+    "(1 - p) ** i * p ** (n - i)",
+)
+chance.mistake(
+    "That is the probability of fewer than k: at least k is the rest.",
+    "range(k, n + 1)",
+    "range(k)",
+)
+chance.mistake(
+    "In n episodes there are n - i failures beside i wins: yours are raised to n.",
+    "** (n - i)",
+    "**n",
+)
+chance.mistake(
     "k wins can fall on many sets of episodes: count them with math.comb.", "math.comb(n, i) * ", ""
 )
 
@@ -99,13 +179,53 @@ def difference(a, b, picks_a, picks_b):
     return float(np.quantile(means, 0.025)), float(np.quantile(means, 0.975))
 
 
-def _seeds(rng, n=5, m=5, draws=400):
+def _seeds(rng, n=5, m=5):
+    draws = int(rng.integers(200, 500))
     a, b = rng.uniform(0.3, 1, n), rng.uniform(0, 0.9, m)
     return a, b, rng.integers(0, n, (draws, n)), rng.integers(0, m, (draws, m))
 
 
 difference.check("five seeds each", _seeds)
-difference.check("three seeds and four", lambda rng: _seeds(rng, 3, 4))
+difference.check(
+    "more seeds of one than of the other",
+    lambda rng: _seeds(rng, int(rng.integers(3, 5)), int(rng.integers(6, 9))),
+)
+difference.mistake(
+    "Mean plus and minus 1.96 standard deviations is the normal curve's interval: take the "
+    "quantiles of the draws.",
+    "float(np.quantile(means, 0.025)), float(np.quantile(means, 0.975))",
+    "float(means.mean() - 1.96 * means.std()), float(means.mean() + 1.96 * means.std())",
+)
+difference.mistake(
+    "Return (low, high): yours are the other way round.",
+    "float(np.quantile(means, 0.025)), float(np.quantile(means, 0.975))",
+    "float(np.quantile(means, 0.975)), float(np.quantile(means, 0.025))",
+)
+difference.mistake(
+    "A draw is the mean of its picks, not their sum.",
+    "a[picks_a].mean(1) - b[picks_b].mean(1)",
+    "a[picks_a].sum(1) - b[picks_b].sum(1)",
+)
+difference.mistake(
+    "np.quantile counts from 0 to 1, np.percentile from 0 to 100: 0.025 is 2.5 %.",
+    "np.quantile",
+    "np.percentile",
+)
+difference.mistake(
+    "The smallest and the largest difference hold all draws: 95 % are between the quantiles.",
+    "float(np.quantile(means, 0.025)), float(np.quantile(means, 0.975))",
+    "float(means.min()), float(means.max())",
+)
+difference.mistake(
+    "The picks are not used: a draw's mean is that of a[picks_a], a row of the picks at a time.",
+    "a[picks_a].mean(1) - b[picks_b].mean(1)",
+    "a.mean() - b.mean()",
+)
+difference.mistake(
+    "You take the median of a draw's picks; the difference is one of means.",
+    "a[picks_a].mean(1) - b[picks_b].mean(1)",
+    "np.median(a[picks_a], 1) - np.median(b[picks_b], 1)",
+)
 difference.check(
     "a method against itself", lambda rng: ((s := _seeds(rng))[0], s[0].copy(), s[2], s[3])
 )
@@ -152,30 +272,68 @@ def verdict(idle, random, expert):
 
 
 def _task(rng, idle=0.0, random=0.02, expert=1.0):
-    n = int(rng.choice([40, 100, 300]))
-    return rng.random(20) < idle, np.arange(n) < int(n * random), rng.random(20) < expert
+    few, n, some = (int(k) for k in rng.integers((5, 61, 15), (80, 600, 30)))
+    return (
+        rng.random(few) < idle,
+        rng.permutation(n) < int(n * random),
+        rng.random(some) < expert,
+    )
+
+
+def _one(rng, values, value):
+    """These truth values with one of them set."""
+    values = values.copy()
+    values[rng.integers(len(values))] = value
+    return values
 
 
 def _twentieth(rng):
     n = 20 * int(rng.integers(2, 8))
-    return np.zeros(20, bool), np.arange(n) < n // 20, rng.random(20) < 1
+    return _task(rng)[0], rng.permutation(n) < n // 20, _task(rng)[2]
 
 
-verdict.check("a fair task", lambda rng: _task(rng, random=rng.uniform(0, 0.05)))
+def _several(rng):
+    """Two or three of the faults; in the last question of three the expert is at fault as well."""
+    idle, random, expert = _task(rng, random=rng.uniform(0.2, 0.6))
+    kind = rng.integers(3)
+    if kind < 2:
+        idle = _one(rng, idle, True)
+    if kind > 0:
+        expert = _one(rng, expert, False)
+    return idle, random, expert
+
+
+verdict.check("a fair task", lambda rng: _task(rng, random=rng.uniform(0, 0.045)))
 verdict.check(
     "one that idling solves now and then",
-    lambda rng: ((t := _task(rng, 0.0))[0] | (np.arange(20) == 7), t[1], t[2]),
+    lambda rng: (_one(rng, (t := _task(rng))[0], True), *t[1:]),
 )
-verdict.check("one that chance solves", lambda rng: _task(rng, random=rng.uniform(0.06, 0.5)))
+verdict.check("one that chance solves", lambda rng: _task(rng, random=rng.uniform(0.08, 0.5)))
 verdict.check("at just one in twenty chance may stand", _twentieth)
-verdict.check("one with an expert that fails", lambda rng: (*_task(rng)[:2], np.arange(20) != 3))
 verdict.check(
-    "two or three of them at once: name the first",
-    lambda rng: (
-        np.ones(20, bool) * bool(k := rng.integers(2)),
-        np.arange(100) < 30,
-        np.arange(20) < 20 * k,
-    ),
+    "one with an expert that fails", lambda rng: (*(t := _task(rng))[:2], _one(rng, t[2], False))
+)
+verdict.check("two or three of them at once: name the first", _several, trials=6)
+verdict.mistake(
+    "More than 5 %: a share of just 0.05 may stand, > and not >=.",
+    "random.mean() > 0.05",
+    "random.mean() >= 0.05",
+)
+verdict.mistake(
+    "5 % is 0.05; yours is a limit of 0.5.", "random.mean() > 0.05", "random.mean() > 0.5"
+)
+verdict.mistake(
+    "mean() is a share, 0 to 1: 5 % is 0.05, not 5.", "random.mean() > 0.05", "random.mean() > 5"
+)
+verdict.mistake(
+    "The expert has to solve every episode: your bound lets it fail some.",
+    "not expert.all()",
+    "expert.mean() < 0.5",
+)
+verdict.mistake(
+    "One idle episode is enough: you apply chance's 5 % to idling as well.",
+    "idle.any()",
+    "idle.mean() > 0.05",
 )
 verdict.mistake(
     "Once is enough: a task that idling solves in one episode is not fair.",
