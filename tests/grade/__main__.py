@@ -18,6 +18,7 @@ import json
 import math
 import queue
 import re
+import secrets
 import sys
 import time
 import traceback
@@ -36,7 +37,7 @@ from tests.grade.judge import UNDONE, Result, best, judge, nothing
 from tests.grade.sandbox import Lost, Sandbox
 from tests.grade.submission import Answer, Notebook, Unreadable, answer, parse
 
-SEED = 2  # other inputs than those of the students' own checks, which could be learnt by heart
+SEED = 2  # of one submission alone; students check themselves with 0
 
 
 def main(argv=None) -> int:
@@ -47,6 +48,7 @@ def main(argv=None) -> int:
         entries = submissions(args.folder, args.out)
         ids, chosen = wanted(args.notebooks, entries)
         args.out.mkdir(parents=True, exist_ok=True)
+        args.seed = noted_seed(args.out, args.seed)
     except ValueError as e:
         say(e, sys.stderr)
         return 2
@@ -81,6 +83,22 @@ def main(argv=None) -> int:
     return 0 if all(written) and not any("failed" in g for g in grades) else 1
 
 
+def noted_seed(out: Path, given: int | None) -> int:
+    """The seed of a class's inputs, noted in seed.txt: one given, or that of before, or a new one.
+
+    Nobody can know it beforehand, so an answer cannot hold a table of the inputs. Raises OSError.
+    """
+    path = out / "seed.txt"
+    if given is None:
+        try:
+            given = int(path.read_bytes())
+        except (OSError, ValueError):
+            given = secrets.randbelow(1 << 31)
+    write_atomic(path, f"{given}\n")
+    say(f"seed of the inputs: {given}, noted in {path}")
+    return given
+
+
 def _arguments(argv) -> argparse.Namespace:
     parser = argparse.ArgumentParser(
         prog="python -m tests.grade", description=__doc__.split("\n")[0]
@@ -92,7 +110,7 @@ def _arguments(argv) -> argparse.Namespace:
         help="numbers of those that were set, such as 5 or 5,6; default: what most handed in",
     )
     parser.add_argument(
-        "--seed", type=int, default=SEED, help="of the inputs; students have 0 (%(default)s)"
+        "--seed", type=int, help="of the inputs, to repeat a grading; by default a new one is drawn"
     )
     how = parser.add_mutually_exclusive_group()
     jobs = {"type": int, "choices": range(1, 65), "default": 2, "metavar": "N"}

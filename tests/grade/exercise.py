@@ -151,7 +151,8 @@ GRADIENTS = """
                 grads = [None] * len(leaves)
             for (k, leaf), g in zip(leaves.items(), grads):
                 which = f" of number {{j + 1}}" if isinstance(out, (list, tuple)) else ""
-                found[f"the gradient{{which}} for {{k}}"] = torch.zeros_like(leaf) if g is None else g
+                g = torch.zeros_like(leaf) if g is None else g
+                found[f"the gradient{{which}} for {{k}}"] = g
         return found
 """
 

@@ -203,9 +203,11 @@ class Sandbox:
             self.kill()
             raise RuntimeError("the grading process is gone") from None
         self.channel = socket.socket(fileno=fd)
+        if (confined := self._answer()) != "confined":  # said before the student's first line
+            raise RuntimeError(str(confined))
         failed = self._answer()
-        if type(failed) is str:  # before the student's first line
-            raise RuntimeError(failed)
+        if failed is not None and type(failed) is not wire.Raised:
+            raise self._lost("it sent something else than an answer")
         return failed
 
     def call(self, args: tuple):

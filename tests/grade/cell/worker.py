@@ -127,6 +127,7 @@ def serve(job: dict, channel, above, readable: list[str]) -> None:
     except BaseException as e:  # never run a stranger's code unconfined
         wire.send(channel, wire.encode(f"unconfined: {e}"))
         os._exit(1)
+    wire.send(channel, wire.encode("confined"))
     try:
         run(job, channel)
     finally:

@@ -1,6 +1,7 @@
 """Notebook 2, soft actor-critic: squashed Gaussian, critics' target, slow copies, temperature."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import torch
@@ -283,8 +284,7 @@ def _two_nets(rng, times, ask):
     """Networks of one to three layers, as lists of weight and bias."""
     sizes = [int(n) for n in rng.integers(2, 6, rng.integers(2, 5))]
     slow, fast = (
-        [[_normal(rng, n, m), _normal(rng, n)] for m, n in zip(sizes, sizes[1:], strict=False)]
-        for _ in range(2)
+        [[_normal(rng, n, m), _normal(rng, n)] for m, n in pairwise(sizes)] for _ in range(2)
     )
     return slow, fast, float(rng.uniform(0.05, 0.3)), times, ask
 

@@ -140,7 +140,7 @@ gan_losses.mistake(
     "(real - 1).abs().mean() + made.abs().mean(), (made - 1).abs().mean()",
 )
 gan_losses.mistake(
-    "That is Eq. 1 with its logarithms, of the scores' sigmoids; the kit plays the game in squares.",
+    "That is Eq. 1 with its logarithms, of the scores' sigmoids; the kit plays it in squares.",
     "((real - 1) ** 2).mean() + (made**2).mean(), ((made - 1) ** 2).mean()",
     "F.softplus(-real).mean() + F.softplus(made).mean(), F.softplus(-made).mean()",
 )
@@ -220,8 +220,10 @@ gan_losses.mistake(
             return [v.detach() if torch.is_tensor(v) else v for v in losses]
         found = {}
         for name, loss in zip(("image", "content", "style"), losses, strict=True):
-            tied = torch.is_tensor(loss) and loss.requires_grad
-            (grad,) = torch.autograd.grad(loss.sum(), g, retain_graph=True) if tied else (0 * w[4:],)
+            grad, more = None, {"retain_graph": True, "allow_unused": True}
+            if torch.is_tensor(loss) and loss.requires_grad:
+                (grad,) = torch.autograd.grad(loss.sum(), g, **more)
+            grad = 0 * w[4:] if grad is None else grad
             found[f"the gradient of the {name} loss for the generators"] = grad
         return found
     """,
