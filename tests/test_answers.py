@@ -59,7 +59,9 @@ def using(name):
 
 RIGHT = {
     "partial": ("from functools import partial\nroot = partial(np.power, x2=0.5)", "root"),
-    "a constant by a function of math": ("from math import sqrt\nTWO = sqrt(4)", "TWO / 2 * np.sqrt"),
+    "a constant by a function of math": (
+        "from math import sqrt\nTWO = sqrt(4)", "TWO / 2 * np.sqrt",
+    ),
     "a constant by numpy": ("import numpy\nTWO = numpy.sqrt(4)", "TWO / 2 * np.sqrt"),
     "if and else": ("if torch.cuda.is_available():\n    k = 1\nelse:\n    k = 1.0", "k * np.sqrt"),
     "an import that may fail": (
@@ -72,7 +74,9 @@ RIGHT = {
         "from dataclasses import dataclass\n@dataclass\nclass T:\n    k: float = 1.0\nt = T()",
         "t.k * np.sqrt",
     ),
-    "a table filled in a loop": ("F = {}\nfor f in (np.sqrt,):\n    F[f.__name__] = f", "F['sqrt']"),
+    "a table filled in a loop": (
+        "F = {}\nfor f in (np.sqrt,):\n    F[f.__name__] = f", "F['sqrt']",
+    ),
     "a patched module": ("np.wurzel = np.sqrt", "np.wurzel"),
     "beside a plot": (
         "import matplotlib.pyplot as plt\nfig, axes = plt.subplots(1, 2)\n"
@@ -83,10 +87,12 @@ RIGHT = {
         "root = np.sqrt\nfor i in range(10**12):\n    x = i * i", "root",
     ),
     "beside one that catches all": (
-        "root = np.sqrt\nwhile True:\n    try:\n        x = 1\n    except BaseException:\n        pass",
-        "root",
+        "root = np.sqrt\nwhile True:\n    try:\n        x = 1\n    except BaseException:\n"
+        "        pass", "root",
     ),
-    "beside one that ends the kernel": ("import os\nroot = np.sqrt\nif root:\n    os._exit(0)", "root"),
+    "beside one that ends the kernel": (
+        "import os\nroot = np.sqrt\nif root:\n    os._exit(0)", "root",
+    ),
 }  # fmt: skip
 
 
@@ -114,7 +120,8 @@ PLACES = {
     ],
     "right below the check": [marked("6.1", WRONG), 'check("6.1")', f"{R1}\n{R2}"],
     "right in the marked cell, another use of the name at the end": [
-        marked("6.1", R1), 'check("6.1")', R2, "r1 = r2 = r1(np.zeros((1, 2)), np.zeros((2, 1, 2)))",
+        marked("6.1", R1), 'check("6.1")', R2,
+        "r1 = r2 = r1(np.zeros((1, 2)), np.zeros((2, 1, 2)))",
         R2,
     ],
     "a damaged cell": [{"cell_type": "code"}, marked("6.1", f"{R1}\n{R2}"), {}, None],
@@ -184,7 +191,7 @@ FORMS = {
     "        slow.data.lerp_(fast.data, tau)",
     "1.2 pinv": "task_inertia = lambda J, M: np.linalg.pinv(J @ np.linalg.solve(M, J.T))",
     "11.2 deque": "from collections import deque\n"
-    + ALL["11.2"].source.replace("return torch.stack(shown), pool", "return torch.stack(shown), deque(pool)"),
+    + ALL["11.2"].source.replace("stack(shown), pool", "stack(shown), deque(pool)"),
 }  # fmt: skip
 
 

@@ -139,7 +139,7 @@ GRADIENTS = """
             args[i] = leaves[k]
         found = {{}}
         out = {name}(*args)
-        for j, part in enumerate(out if isinstance(out, (list, tuple)) else [out]):
+        for j, part in enumerate(out if {several} else [out]):
             if torch.is_tensor(part) and part.requires_grad:
                 # Weighted, or in a sum of many numbers gradients could cancel.
                 weights = torch.cos(torch.arange(float(part.numel()))).view(part.shape)
@@ -150,19 +150,20 @@ GRADIENTS = """
             else:
                 grads = [None] * len(leaves)
             for (k, leaf), g in zip(leaves.items(), grads):
-                which = f" of number {{j + 1}}" if isinstance(out, (list, tuple)) else ""
+                which = f" of number {{j + 1}}" if {several} else ""
                 g = torch.zeros_like(leaf) if g is None else g
                 found[f"the gradient{{which}} for {{k}}"] = g
         return found
 """
 
 
-def gradients(name: str, **leaves: int) -> str:
+def gradients(name: str, several: bool = False, **leaves: int) -> str:
     """A probe that asks for "values" or for the "gradient" with respect to some arguments.
 
-    name: of the function. leaves: names and positions of these arguments.
+    name: of the function. several: whether it returns several tensors. leaves: names and positions
+    of these arguments.
     """
-    return GRADIENTS.format(name=name, leaves={i: k for k, i in leaves.items()})
+    return GRADIENTS.format(name=name, several=several, leaves={i: k for k, i in leaves.items()})
 
 
 def exercise(id: str, title: str, *, given: tuple = (), probe: str = ""):
@@ -269,6 +270,8 @@ def _different_numbers(got, want, check):
     if not (isinstance(got, np.ndarray) or _is_number(got) or isinstance(got, bool)):
         return f"it returns {_kind(got)}; expected {_kind(want)}"
     got, want = np.asarray(got), np.asarray(want)
+    if got.shape == (1,) and not want.ndim:  # one number
+        got = got.reshape(())
     if got.shape != want.shape:
         return f"it has shape {got.shape}; expected {want.shape}"
     if (got.dtype.kind == "b") != (want.dtype.kind == "b"):

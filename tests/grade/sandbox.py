@@ -207,7 +207,7 @@ class Sandbox:
             raise RuntimeError(str(confined))
         failed = self._answer()
         if failed is not None and type(failed) is not wire.Raised:
-            raise self._lost("it sent something else than an answer")
+            raise self._lost(NO_ANSWER)
         return failed
 
     def call(self, args: tuple):

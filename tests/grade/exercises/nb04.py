@@ -93,7 +93,11 @@ adain.mistake(
 adain.mistake("Add 1e-5 to the variance; yours is without.", " + 1e-5", "")
 
 
-@exercise("4.2", "The game of Eq. 1, in squares", probe=gradients("gan_losses", real=0, made=1))
+@exercise(
+    "4.2",
+    "The game of Eq. 1, in squares",
+    probe=gradients("gan_losses", several=True, real=0, made=1),
+)
 def gan_losses(real, made):
     return ((real - 1) ** 2).mean() + (made**2).mean(), ((made - 1) ** 2).mean()
 
@@ -398,8 +402,6 @@ munit_loss.mistake(
     "In Eq. 5 the game has no weight: you multiply it by lam_image.",
     'L["gan_x"] + L["gan_y"]\n        + lam_image * (L',
     'lam_image * (L["gan_x"] + L["gan_y"]\n        + L',
-    '+ L["image_y"])',
-    '+ L["image_y"]))',
 )
 munit_loss.mistake(
     "Each kind of reconstruction has its weight; you use none.",

@@ -135,11 +135,11 @@ r2.mistake(
     "z_E[2:] - z_E[1:-1]",
 )
 r2.mistake(
-    "The demonstration's steps have the opposite sign: z^E_{q+1} - z^E_q.",
-    "z_E[1:] - z_E[:-1]",
-    "z_E[:-1] - z_E[1:]",
+    "A step is the later place minus the earlier one, the robot's as the demonstration's: one of "
+    "yours has the opposite sign.",
+    "z_next - z",
+    "z - z_next",
 )
-r2.mistake("A step is z_{t+1} - z_t; yours has the opposite sign.", "z_next - z", "z - z_next")
 r2.mistake(
     "A reward is larger when the step is nearer: Eq. 10 has a minus in front.",
     "-np.sqrt",

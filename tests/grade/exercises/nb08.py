@@ -14,6 +14,14 @@ def _video(rng):
     return (frames + rng.integers(-2, 3, frames.shape)).clip(0, 255).astype(np.uint8)
 
 
+def _grey(rng):
+    """A grey video, whose differences are whole numbers, and one of them for a threshold."""
+    grey = _video(rng)[..., :1]
+    apart = np.abs(grey - np.median(grey, axis=0)).astype(int)
+    some = np.unique(apart[(apart > 4) & (np.median(grey, axis=0) % 1 == 0)])
+    return np.repeat(grey, 3, axis=-1), float(rng.choice(some))
+
+
 @exercise("8.2", "What stands out from the median")
 def foreground(video, threshold):
     video = video.astype(float)
@@ -44,6 +52,12 @@ foreground.mistake(
     "frame before.",
     "np.median(video, axis=0)",
     "np.concatenate([video[:1], video[:-1]])",
+)
+foreground.check("a difference of just the threshold is not above it", _grey)
+foreground.mistake(
+    "More than the threshold: a difference of just the threshold is not foreground, > and not >=.",
+    "> threshold",
+    ">= threshold",
 )
 foreground.check("another threshold", lambda rng: (_video(rng), float(rng.uniform(5, 60))))
 foreground.check(
