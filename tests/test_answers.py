@@ -58,7 +58,7 @@ def using(name):
 
 
 RIGHT = {
-    "partial": ("from functools import partial\nroot = partial(np.power, x2=0.5)", "root"),
+    "partial": ("from functools import partial\nroot = partial(lambda k, x: x**k, 0.5)", "root"),
     "a constant by a function of math": (
         "from math import sqrt\nTWO = sqrt(4)", "TWO / 2 * np.sqrt",
     ),

@@ -232,7 +232,6 @@ solved.mistake(
     "return (np.abs(x[1:] - target) < 0.05) & (speed < 0.02)",
     "return ((np.abs(x[1:] - target) < 0.05) & (speed < 0.02)).any()",
 )
-solved.mistake("A speed is way by time: divide by dt, do not multiply.", "/ dt", "* dt")
 solved.mistake(
     "Near is within 0.05 m, slow is below 0.02 m/s: your two bounds are swapped.",
     "< 0.05) & (speed < 0.02)",
