@@ -111,10 +111,17 @@ BAD = {
     ),
     "starts a program": ("import subprocess\ngot = subprocess.run(['ls'])\n" + NEEDS, 0),
     "forges the channel": (
+        "import os\ndef r1(z, z_E):\n    for fd in range(3, 64):\n"
+        "        try:\n            os.write(fd, bytes(8) + b'{}' * 100)\n"
+        "        except OSError:\n            pass\n"
+        + "\n".join(RIGHT.splitlines()[1:]),
+        0,
+    ),
+    "forges the channel beside its answer": (
         "import os\nfor fd in range(3, 64):\n"
         "    try:\n        os.write(fd, bytes(8) + b'{}' * 100)\n"
         "    except OSError:\n        pass\n" + RIGHT,
-        0,
+        E61.points,  # tried again with its definitions alone, which are right
     ),
     "nearly always the same": ("def r1(z, z_E):\n    return -1e-9 * np.abs(z).sum()", 0),
     "endless recursion": ("def r1(z, z_E):\n    return r1(z, z_E)", 0),
@@ -416,7 +423,8 @@ def test_two_gradings_are_equal_to_the_byte(tmp_path):
     write(tmp_path / "class", "ann", answered(E61.wrong(E61.mistakes[0])))
     write(tmp_path / "class", "bob", SOLVED)
     for out in ("a", "b"):
-        assert main([str(tmp_path / "class"), "--out", str(tmp_path / out), "-j", "1"]) == 0
+        line = [str(tmp_path / "class"), "--out", str(tmp_path / out), "-j", "1", "--seed", "3"]
+        assert main(line) == 0
     for a in sorted((tmp_path / "a").rglob("*.*")):
         assert a.read_bytes() == (tmp_path / "b" / a.relative_to(tmp_path / "a")).read_bytes()
 

@@ -86,7 +86,7 @@ def main(argv=None) -> int:
 def noted_seed(out: Path, given: int | None) -> int:
     """The seed of a class's inputs, noted in seed.txt: one given, or that of before, or a new one.
 
-    Nobody can know it beforehand, so an answer cannot hold a table of the inputs. Raises OSError.
+    Nobody can know it beforehand, so an answer cannot hold a table of the inputs.
     """
     path = out / "seed.txt"
     if given is None:
@@ -94,8 +94,8 @@ def noted_seed(out: Path, given: int | None) -> int:
             given = int(path.read_bytes())
         except (OSError, ValueError):
             given = secrets.randbelow(1 << 31)
-    write_atomic(path, f"{given}\n")
-    say(f"seed of the inputs: {given}, noted in {path}")
+    noted = keep(path, f"{given}\n")
+    say(f"seed of the inputs: {given}{f', noted in {path}' if noted else ''}")
     return given
 
 

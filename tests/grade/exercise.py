@@ -119,7 +119,7 @@ class Exercise:
             exec(part, space)
 
         def call(args):
-            torch.manual_seed(0)
+            torch.default_generator.manual_seed(0)
             try:
                 value = space["probe"](*decode(encode(args), torch.from_numpy))
             except Exception as e:

@@ -47,10 +47,18 @@ class Cell:
     course: bool = False
 
     def __post_init__(self):
-        tree = _parse(self.source)
-        body = [node for node in (tree.body if tree else []) if not is_stub(node)]
-        self.defines = set().union(*map(bound, body))
-        self.checks = set().union(*map(_checked, body))
+        look = _look_at_course if self.course else _look
+        self.defines, self.checks = look(self.source)
+
+
+def _look(source: str) -> tuple[set[str], set[str]]:
+    """`Cell.defines` and `Cell.checks`."""
+    tree = _parse(source)
+    body = [node for node in (tree.body if tree else []) if not is_stub(node)]
+    return set().union(*map(bound, body)), set().union(*map(_checked, body))
+
+
+_look_at_course = functools.cache(_look)  # most cells of a class are the same
 
 
 @dataclass
@@ -118,9 +126,12 @@ def _cell(cell) -> Cell | None:
         text = cell["source"] if isinstance(cell["source"], str) else "".join(cell["source"])
         if len(text) > LENGTH:
             return None
-        source = _plain(text)
-        return Cell(source, _marked(cell, source), text.strip() in _released())
-    except (KeyError, TypeError, AttributeError):
+        if text.strip() in _released():
+            source, course = text.strip(), True
+        else:
+            source, course = _plain(text), False
+        return Cell(source, _marked(cell, source), course)
+    except (KeyError, TypeError, AttributeError, RecursionError, MemoryError):
         return None
 
 
@@ -193,9 +204,7 @@ def _inside(line: str, quotes: str, depth: int) -> tuple[str, int]:
 
 def _parse(source: str) -> ast.Module | None:
     try:
-        tree = ast.parse(source)
-        ast.unparse(tree)  # what is nested too deep for that is for what comes, too
-        return tree
+        return ast.parse(source)
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         return None
 
@@ -214,7 +223,7 @@ def _released() -> set[str]:
     for path in RELEASED.glob("*.ipynb"):
         for cell in json.loads(path.read_text(encoding="utf-8"))["cells"]:
             text = "".join(cell["source"]).strip()
-            if cell["cell_type"] == "code" and not _marked(cell, text):
+            if cell["cell_type"] == "code" and not _marked(cell, text) and _parse(text):
                 found.add(text)
     return found
 

@@ -6,6 +6,7 @@ itself before it runs a line of the student's. This process runs none, and ends 
 judge has seen enough of it.
 """
 
+import gc
 import io
 import os
 import select
@@ -65,6 +66,7 @@ def main(fd: int, readable: list[str]) -> None:
 
     space["torch"].set_num_threads(1)
     sys.meta_path[:0] = [answer.Hidden(), answer.Drawing()]
+    gc.freeze()  # or each fork's collector would write to, and so copy, all that is loaded here
     wire.send(control, b"ready")
     while True:
         try:
@@ -120,10 +122,13 @@ def serve(job: dict, channel, above, readable: list[str]) -> None:
         silence = os.open(os.devnull, os.O_RDWR)
         for place in (0, 1, 2):
             os.dup2(silence, place)
+        first = 3
+        for kept in sorted((channel.fileno(), above.fileno())):
+            os.closerange(first, kept)
+            first = kept + 1
+        os.closerange(first, 1 << 20)
         walls.confine(job["memory"], job["cpu"], readable, above)
-        keep = channel.fileno()
-        os.closerange(3, keep)
-        os.closerange(keep + 1, 1 << 10)
+        above.close()
     except BaseException as e:  # never run a stranger's code unconfined
         wire.send(channel, wire.encode(f"unconfined: {e}"))
         os._exit(1)
