@@ -335,9 +335,10 @@ FUNCTIONS = [id for id in ALL if ALL[id].source.startswith("def ")]
 UNREAD = {("2.2", "truncated")}
 
 
-@pytest.mark.parametrize(
-    "id, name", [(id, n) for id in FUNCTIONS for n in parameters(ALL[id])], ids="-".join
-)
+ARGUMENTS = [(id, name) for id in FUNCTIONS for name in parameters(ALL[id])]
+
+
+@pytest.mark.parametrize("id, name", ARGUMENTS, ids=map("-".join, ARGUMENTS))
 def test_an_argument_cannot_be_hard_coded(id, name):
     """An answer that takes the first value it is given for all values loses points."""
     if (id, name) in UNREAD:

@@ -530,6 +530,127 @@ FORMS = {
         "def verdict(idle, random, expert):\n    if idle.max():\n        return V.A\n"
         "    if random.mean() > 0.05:\n        return V.B\n    return V.D if expert.min() else V.C",
     ],
+    "1.5": [
+        "class Point(gym.Env):\n    def reset(self, seed=None, options=None):\n"
+        "        gym.Env.reset(self, seed=seed)\n        self.steps = 0\n"
+        "        self.place = self.np_random.uniform(-1, 1)\n"
+        "        return np.float32([self.place]), {}\n    def step(self, a):\n"
+        "        self.place += 0.05 * min(1.0, max(-1.0, a[0]))\n        self.steps += 1\n"
+        "        done = bool(-0.05 < self.place < 0.05)\n        out = np.float32([self.place])\n"
+        "        return out, 1.0 if done else 0.0, False, self.steps >= 50, {'is_success': done}",
+        "class Point(gym.Env):\n    t = 0\n    def look(self):\n"
+        "        return np.array([self.x]).astype('float32')\n"
+        "    def reset(self, *, seed=None, options=None):\n        super().reset(seed=seed)\n"
+        "        self.x = float(self.np_random.uniform(-1, 1))\n        self.t = 0\n"
+        "        return self.look(), dict()\n    def step(self, action):\n"
+        "        self.x = self.x + 0.05 * np.clip(action, -1, 1)[0]\n        self.t += 1\n"
+        "        near = np.abs(self.x) < 0.05\n"
+        "        return self.look(), near * 1.0, False, not self.t < 50, dict(is_success=near)",
+        "class Base(gym.Env):\n    def reset(self, **how):\n        super().reset(seed=how.get("
+        "'seed'))\n        self.left, self.x = 50, self.np_random.uniform(-1, 1)\n"
+        "        return self.obs, {}\n    @property\n    def obs(self):\n"
+        "        return np.full(1, self.x, np.float32)\nclass Point(Base):\n"
+        "    def step(self, action):\n        (a,) = np.clip(action, -1, 1)\n"
+        "        self.x, self.left = self.x + a / 20, self.left - 1\n"
+        "        ok = int(abs(self.x) < 0.05)\n"
+        "        return self.obs, float(ok), False, self.left <= 0, {'is_success': bool(ok)}",
+        "class Point(gym.Env):\n    def reset(self, *, seed=None, options=None):\n"
+        "        super().reset(seed=seed)\n        self.path = [self.np_random.uniform(-1, 1)]\n"
+        "        return np.array(self.path, np.float32), {}\n    def step(self, action):\n"
+        "        self.path.append(self.path[-1] + 0.05 * np.clip(action[0], -1, 1))\n"
+        "        x = self.path[-1]\n        return (np.array([x], dtype=np.float32), "
+        "float(abs(x) < 0.05), False, len(self.path) > 50, {'is_success': abs(x) < 0.05})",
+    ],
+    "11.1": [
+        "def cyclegan_loss(x, y, G, Fx, D_x, D_y, lam):\n    u, v = G(x), Fx(y)\n"
+        "    one = lambda s: F.mse_loss(s, torch.ones_like(s))\n"
+        "    return one(D_y(u)) + one(D_x(v)) + lam * (F.l1_loss(Fx(u), x) + F.l1_loss(G(v), y))",
+        "def cyclegan_loss(x, y, to_y, to_x, D_x, D_y, lam):\n"
+        "    total = lam * ((x - to_x(to_y(x))).abs().mean() + (y - to_y(to_x(y))).abs().mean())\n"
+        "    return total + (1 - D_y(to_y(x))).pow(2).mean() + (1 - D_x(to_x(y))).pow(2).mean()",
+        "def cyclegan_loss(x, y, to_y, to_x, D_x, D_y, lam):\n    loss = 0\n"
+        "    for a, there, back, D in ((x, to_y, to_x, D_y), (y, to_x, to_y, D_x)):\n"
+        "        b = there(a)\n        loss = loss + torch.mean((D(b) - 1) ** 2)\n"
+        "        loss = loss + lam * torch.mean(torch.abs(back(b) - a))\n    return loss",
+        "def cyclegan_loss(*a):\n    x, y, to_y, to_x, D_x, D_y, lam = a\n"
+        "    u, v = to_y(x), to_x(y)\n    m = lambda t: t.sum() / t.numel()\n"
+        "    return (m((D_y(u) - 1).square()) + m((D_x(v) - 1).square()) + lam * m((to_x(u) - "
+        "x).abs())"
+        " + lam * m((to_y(v) - y).abs())).reshape(1)",
+    ],
+    "11.2": [
+        "from collections import deque\ndef swap(pool, made, size, coins, places):\n"
+        "    pool, out = deque(pool), []\n    for i, v in enumerate(made.detach()):\n"
+        "        if len(pool) < size:\n            pool.append(v)\n            out.append(v)\n"
+        "        elif coins[i] >= 0.5:\n            out.append(v)\n        else:\n"
+        "            out.append(pool[places[i]])\n            pool[places[i]] = v\n"
+        "    return torch.stack(out), pool",
+        "def swap(pool, made, size, coins, places):\n    new = [*pool]\n    out = "
+        "made.clone().detach()\n"
+        "    for i in range(len(made)):\n        image = made[i].detach().clone()\n"
+        "        if len(new) < size:\n            new += [image]\n        elif coins[i] < 0.5:\n"
+        "            out[i], new[places[i]] = new[places[i]], image\n    return out, new",
+        "@torch.no_grad()\ndef swap(pool, made, size, coins, places):\n"
+        "    pool, shown = pool.copy(), torch.empty_like(made)\n"
+        "    for i, (v, c, p) in enumerate(zip(made.detach(), coins, places)):\n"
+        "        shown[i] = v\n        if len(pool) < size:\n            pool.append(v)\n"
+        "            continue\n        if c < 0.5:\n            shown[i] = pool[p]\n"
+        "            pool[p] = v\n    return shown, tuple(pool)",
+        "def swap(pool, made, size, coins, places):\n    state = list(pool)\n"
+        "    def one(v, coin, place):\n        if len(state) < size:\n            state.append(v)\n"
+        "            return v\n        if not coin < 0.5:\n            return v\n"
+        "        old, state[place] = state[place], v\n        return old\n"
+        "    got = list(map(one, made.data, coins, places))\n    return torch.stack(got, 0), state",
+    ],
+    "11.3": [
+        "def mixup_loss(classify, goals, others, share, partner):\n"
+        "    v = torch.cat((goals, others))\n    l = (torch.arange(len(v)) < len(goals)).float()\n"
+        "    s = share[:, None, None, None]\n    c = classify(torch.lerp(v[partner], v, s))\n"
+        "    t = share * l + (1 - share) * l[partner]\n"
+        "    return (F.softplus(-c) * t + F.softplus(c) * (1 - t)).mean()",
+        "def mixup_loss(classify, goals, others, share, partner):\n"
+        "    v = torch.vstack([goals, others])\n"
+        "    l = torch.tensor([1.0] * len(goals) + [0.0] * len(others))\n"
+        "    mix = lambda a: share.reshape(-1, *[1] * (a.ndim - 1)) * (a - a[partner]) + "
+        "a[partner]\n"
+        "    return nn.BCEWithLogitsLoss()(classify(mix(v)), mix(l))",
+        "def mixup_loss(classify, goals, others, share, partner):\n"
+        "    v = torch.cat([goals, others])\n    l = torch.zeros(len(v))\n    l[: len(goals)] = 1\n"
+        "    s = share.view(len(v), 1, 1, 1)\n    c = classify(v * s + v[partner] * (1 - s))\n"
+        "    t = l * share + l[partner] * (1 - share)\n"
+        "    return (-t * F.logsigmoid(c) - (1 - t) * F.logsigmoid(-c)).sum() / len(v)",
+        "def mixup_loss(classify, goals, others, share, partner):\n"
+        "    v = torch.cat([goals, others])\n    l = torch.cat([goals.new_ones(len(goals)), "
+        "others.new_zeros(len(others))])\n    mixed = torch.stack([s * v[i] + (1 - s) * v[p] for "
+        "i, "
+        "(s, p) in enumerate(zip(share, partner))])\n    t = torch.stack([s * l[i] + (1 - s) * "
+        "l[p] "
+        "for i, (s, p) in enumerate(zip(share, partner))])\n"
+        "    c = classify(mixed)\n    return (c.clamp(min=0) - c * t + "
+        "(-c.abs()).exp().log1p()).mean()",
+    ],
+    "11.4": [
+        "def sac_ae_losses(encoder, decoder, critic, actor, x, a, y, lam):\n    h = encoder(x)\n"
+        "    q = F.mse_loss(critic(h, a), y)\n"
+        "    ae = F.mse_loss(decoder(h), x) + lam * h.pow(2).sum(-1).mean()\n"
+        "    with torch.no_grad():\n        still = encoder(x)\n"
+        "    return [q, ae, -critic(still, actor(still)).mean()]",
+        "def sac_ae_losses(encoder, decoder, critic, actor, x, a, y, lam):\n"
+        "    q = (y - critic(encoder(x), a)).square().mean()\n    h = encoder(x)\n"
+        "    ae = (x - decoder(h)).square().mean() + lam * torch.linalg.norm(h, "
+        "dim=1).pow(2).mean()\n"
+        "    d = encoder(x).detach()\n    return q, ae, critic(d, actor(d)).neg().mean()",
+        "def sac_ae_losses(encoder, decoder, critic, actor, x, a, y, lam):\n    h = encoder(x)\n"
+        "    n = len(x)\n    c = ((critic(h, a) - y) ** 2).sum() / n\n"
+        "    e = ((decoder(h) - x) ** 2).flatten(1).mean(1).mean() + lam * (h * h).sum() / n\n"
+        "    g = h.data\n    return c, e, -(critic(g, actor(g)).sum() / n)",
+        "def sac_ae_losses(encoder, decoder, critic, actor, x, a, y, lam):\n    h = encoder(x)\n"
+        "    stop = h.clone().detach()\n    pi = actor(stop)\n    losses = {\n"
+        "        'q': torch.mean((critic(h, a) - y) ** 2),\n"
+        "        'ae': torch.mean((decoder(h) - x) ** 2) + lam * torch.einsum('bl,bl->b', h, "
+        "h).mean(),\n"
+        "        'pi': torch.mean(-critic(stop, pi))}\n    return tuple(losses.values())",
+    ],
 }
 
 

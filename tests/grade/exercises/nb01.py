@@ -142,8 +142,8 @@ def nullspace(J, M):
 
 nullspace.check("a seven-joint arm", _arm, points=2)
 nullspace.check(
-    "a three-joint arm, two directions",
-    lambda rng: (rng.normal(size=(2, 3)), np.diag(rng.uniform(0.5, 2, 3))),
+    "a four-joint arm, three directions",
+    lambda rng: (rng.normal(size=(3, 4)), np.diag(rng.uniform(0.5, 2, 4))),
 )
 nullspace.mistake(
     "That is the projector of geometry, for velocities: forces need the one weighted with M.",

@@ -221,20 +221,20 @@ observe.mistake(
     "9.3",
     "The method, assembled",
     probe="""
-    def probe(demo, robot):
+    def probe(demo, robot, colour, scale, kind):
         calls = []
 
         def translate(frames):
             calls.append("translate")
-            return frames + 1000
+            return frames + colour
 
         def detect(frames):
             calls.append("detect")
-            return 2 * frames
+            return scale * frames
 
         def make_reward(z_E, z_robot):
             calls.append("make_reward")
-            return {"follows": z_E, "pace": z_robot}
+            return {"follows": z_E, "pace": z_robot, "kind": kind}
 
         def train(reward):
             calls.append("train")
@@ -251,14 +251,15 @@ def learn_by_watching(demo, robot, translate, detect, make_reward, train):
     return train(reward)
 
 
+def _videos(rng, least, most):
+    demo, robot = (rng.normal(size=(n, 2)) for n in rng.integers(least, most, 2))
+    return demo, robot, float(rng.uniform(500, 2000)), float(rng.uniform(2, 3)), float(rng.random())
+
+
 learn_by_watching.check(
-    "the reward follows the translated video",
-    lambda rng: (rng.normal(size=(7, 2)), rng.normal(size=(9, 2))),
-    points=2,
+    "the reward follows the translated video", lambda rng: _videos(rng, 5, 12), points=2
 )
-learn_by_watching.check(
-    "videos of any length", lambda rng: (rng.normal(size=(3, 2)), rng.normal(size=(30, 2)))
-)
+learn_by_watching.check("videos of any length", lambda rng: _videos(rng, 2, 40))
 learn_by_watching.mistake(
     "You look for keypoints on the human's frames; the detector knows robots: translate first.",
     "detect(translate(demo))",

@@ -15,13 +15,13 @@ def _normal(rng, *shape, scale=1.0):
     "11.1",
     "The generators' loss",
     probe="""
-    def probe(w, x, y, lam, ask):
-        # Generators and critics with recognisable constants; w (4,) are the generators' weights.
+    def probe(w, x, y, lam, c, ask):
+        # Generators with weights w (4,), critics with weights c (2,).
         w = w.clone().requires_grad_()
         to_y = lambda v: torch.tanh(w[0] * v) + w[1]
         to_x = lambda v: w[2] * v - w[3] * v.square()
-        D_x = lambda v: 0.5 * v.mean((1, 2, 3)) + 0.3
-        D_y = lambda v: 1.5 * torch.sin(v[:, :1]) - 0.4
+        D_x = lambda v: c[0] * v.mean((1, 2, 3)) + 0.3
+        D_y = lambda v: c[1] * torch.sin(v[:, :1]) - 0.4
         loss = cyclegan_loss(x, y, to_y, to_x, D_x, D_y, lam)
         if ask == "loss":
             return loss.detach()
@@ -41,7 +41,8 @@ def _domains(rng, ask, more=0):
     """Images of both domains, `more` further ones of y, and generators' weights near 1."""
     n, *shape = (int(v) for v in rng.integers(1, 6, 4))
     x, y = _normal(rng, n, *shape), _normal(rng, n + more, *shape) + 0.5
-    return 1 + _normal(rng, 4, scale=0.3), x, y, float(rng.uniform(0.3, 12)), ask
+    critics = torch.tensor([rng.uniform(0.3, 0.7), rng.uniform(1, 2)], dtype=torch.float32)
+    return 1 + _normal(rng, 4, scale=0.3), x, y, float(rng.uniform(0.3, 12)), critics, ask
 
 
 cyclegan_loss.check("the value of the loss", lambda rng: _domains(rng, "loss"), points=2)
