@@ -193,8 +193,10 @@ def _doubt(asked: list[Asked], call, renew) -> str:
     """Why right answers earn nothing; empty if they do."""
     if _all_same([a.got for a in asked]) and not _all_same([a.want for a in asked]):
         return "it returns the same, whatever it is given"
-    known = list({id(a.check): (a.args, a.got) for a in reversed(asked)}.values())[::-1]
-    return _repeat(known, call, renew)
+    known = {}
+    for a in asked:
+        known.setdefault(id(a.check), (a.args, a.got))
+    return _repeat(list(known.values()), call, renew)
 
 
 def _repeat(known, call, renew) -> str:

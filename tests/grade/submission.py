@@ -71,8 +71,9 @@ class Notebook:
 
     def __post_init__(self):
         votes = Counter(c.exercise.split(".")[0] for c in self.cells if c.exercise)
+        theirs = [c for c in self.cells if not c.course]
         for e in everything().values():
-            votes[e.id.split(".")[0]] += any(e.name in c.defines for c in self.cells)
+            votes[e.id.split(".")[0]] += any(e.name in c.defines for c in theirs)
         self.number = max(votes, key=votes.get) if votes.total() else ""
 
 
