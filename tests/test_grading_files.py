@@ -16,7 +16,7 @@ from xml.etree import ElementTree
 import pytest
 
 import tests.grade.__main__ as grading
-from tests.grade import files
+from tests.grade import files, sandbox
 from tests.grade.__main__ import harmless, main, safe
 from tests.grade.cell.answer import STUB
 from tests.grade.exercise import everything, find
@@ -153,7 +153,7 @@ def write(folder, path, text):
 
 @pytest.fixture(scope="module")
 def graded(tmp_path_factory):
-    """The odd class: its output folder, and what was printed."""
+    """The odd class: its output folder, what was printed, and the workers that were started."""
     folder, out = tmp_path_factory.mktemp("class"), tmp_path_factory.mktemp("grades")
     for path, text in PLAIN.items():
         write(folder, path, text)
@@ -181,8 +181,10 @@ def graded(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         printed = []
         patch.setattr(grading, "say", lambda text, where=None: printed.append(printable(str(text))))
+        starts, command = [], sandbox.command
+        patch.setattr(sandbox, "command", lambda fd: starts.append(fd) or command(fd))
         assert main([str(folder), "--out", str(out), "--gradescope"]) == 1
-    yield out, printed
+    yield out, printed, starts
     subprocess.run(["rm", "-rf", deep], check=True)  # too deep for pytest to clean up
 
 
@@ -214,8 +216,15 @@ def test_the_set_is_what_most_handed_in_and_it_is_said(graded):
     )
 
 
+def test_two_workers_do_for_a_class_and_progress_is_shown(graded):
+    _, printed, starts = graded
+    assert len(starts) == 2
+    many = len(EXPECTED)
+    assert sum(line.startswith(f"[{many}/{many}] ") for line in printed) == 1
+
+
 def test_nothing_that_is_written_or_printed_holds_control_characters(graded):
-    out, printed = graded
+    out, printed, _ = graded
     texts = [p.read_text() for p in out.rglob("*.*") if p.is_file()] + printed
     assert not [t for t in texts if re.search("[\0-\x08\x0b-\x1f\x7f\u202e\ud800-\udfff]", t)]
 

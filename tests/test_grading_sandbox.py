@@ -245,6 +245,7 @@ def sends(body):
         'b\'{"dict": [[{"list": []}, {"v": true}]]}\'',
         'b\'{"array": "f8", "kind": false, "shape": [\' + b\'9\' * 4000 + b\']}\'',
     ],
+    ids=["long", "nested", "brackets", "no key", "no shape"],
 )
 def test_an_answer_that_is_no_value_costs_the_judge_no_time(box, body):
     began = time.process_time()
