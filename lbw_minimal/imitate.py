@@ -84,7 +84,9 @@ class Run:
     def __init__(self, out: Path):
         self.out = Path(out)
         path = self.out / "metrics.json"
-        self.metrics = json.loads(path.read_text()) if path.exists() else {"stages": {}}
+        self.metrics = (
+            json.loads(path.read_text(encoding="utf-8")) if path.exists() else {"stages": {}}
+        )
 
     def save(self) -> None:
         """Write metrics.json."""

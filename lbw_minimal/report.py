@@ -46,7 +46,11 @@ from lbw_minimal.report_texts import (
 from lbw_minimal.training import write_atomic
 
 EPISODE_TITLE, FILM = "What the robot does now", "Film of a test episode"
-MACHINE = ("machine", "memory_mb")  # of metrics.json; the page shows them with the settings
+MACHINE = (
+    "version",
+    "machine",
+    "memory_mb",
+)  # of metrics.json; the page shows them with the settings
 
 
 def wilson(successes: int, n: int) -> tuple[float, float]:

@@ -10,16 +10,18 @@ import json
 import os
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import torch
 from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
 from tqdm import tqdm
+
+T = TypeVar("T")
 
 
 class InputError(ValueError):
@@ -34,6 +36,17 @@ def pick_device(name: str = "cpu") -> torch.device:
         return torch.device(name)
     except RuntimeError:
         raise InputError(f"--device {name}: torch knows no such device; use cpu or cuda.") from None
+
+
+def peak_memory() -> int | None:
+    """The most memory this process has taken so far, in bytes; None on Windows, which counts it
+    elsewhere."""
+    try:
+        import resource
+    except ImportError:
+        return None
+    most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return most if sys.platform == "darwin" else 1024 * most  # in bytes there, else in KiB
 
 
 def seed_everything(seed: int) -> np.random.Generator:
@@ -191,3 +204,11 @@ def progress(total: int, name: str, start: int = 0, delay: float = 0) -> tqdm:
     """A tqdm bar on stderr that also reads well in a log file; it shows after `delay` seconds."""
     every = 0.3 if sys.stderr.isatty() else 15
     return tqdm(total=total, initial=start, desc=name, mininterval=every, ncols=100, delay=delay)
+
+
+def counted(things: Iterable[T], total: int, name: str) -> Iterator[T]:
+    """The things, with a bar that appears if they take longer than 3 s."""
+    with progress(total, name, delay=3) as bar:
+        for thing in things:
+            yield thing
+            bar.update()

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import gymnasium as gym
 
-from lbw_minimal.training import InputError
+from lbw_minimal.training import InputError, counted
 
 if TYPE_CHECKING:
     import numpy as np
@@ -78,7 +78,8 @@ def robot_experts(name: str, jitter: float) -> Iterator[tuple[np.ndarray, Record
 
     env = bare(name, jitter=jitter)
     try:
-        for frames, _, recording in expert_takes(env, ROBOT_EXPERTS):
+        takes = counted(expert_takes(env, ROBOT_EXPERTS), ROBOT_EXPERTS, "robot experts")
+        for frames, _, recording in takes:
             yield frames, recording
     finally:  # also if not all of them are wanted
         env.close()

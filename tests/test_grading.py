@@ -26,6 +26,7 @@ from tests.grade.__main__ import main, safe
 from tests.grade.cell.answer import STUB
 from tests.grade.cell.walls import has_landlock
 from tests.grade.exercise import find
+from tests.grade.judge import _questions
 from tests.grade.sandbox import Sandbox
 from tests.grade.submission import Answer
 
@@ -74,8 +75,8 @@ BAD = {
         0,
     ),
     "patched wire": (
-        "import sys\nwire = sys.modules['wire']\nwire.encode = lambda value: b'you win'\n" + RIGHT,
-        0,
+        "import wire\nwire.encode = lambda value: b'you win'\n" + RIGHT,
+        E61.points,
     ),
     "equals everything": (
         "class Yes(float):\n    __hash__ = None\n"
@@ -557,17 +558,14 @@ def test_of_two_versions_the_one_with_the_released_name_counts_and_it_is_said(tm
 
 
 def test_an_answer_that_counts_its_calls_and_remembers_what_it_said_earns_nothing():
-    """It knows the order of the checks, and says the same again to what it has heard before."""
+    """It has guessed the order of the questions, and says the same again to what it has heard."""
     exercise = find("10.4")
-    said = [
-        str(exercise.run(exercise.source)(check.inputs(np.random.default_rng([2, i]))))
-        for i, check in enumerate(exercise.checks)
-    ]
+    said = [str(exercise.run(exercise.source)(args)) for _, args in _questions(exercise, 2)]
     source = (
         f"said, heard = {said!r}, {{}}\n"
         "def verdict(*args):\n"
         "    key = b''.join(x.tobytes() for x in args)\n"
-        "    return heard.setdefault(key, said[min(len(heard) // 3, len(said) - 1)])\n"
+        "    return heard.setdefault(key, said[min(len(heard), len(said) - 1)])\n"
     )
     with Sandbox() as box:
         result = grading.grade_one(exercise, Answer(source, [], ""), box, seed=2)

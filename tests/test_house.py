@@ -1,9 +1,15 @@
 """The rules of the house: which way imports go, and what may see the simulator's state."""
 
 import ast
+import re
+import tomllib
 from pathlib import Path
 
 import pytest
+import yaml
+from packaging.requirements import Requirement
+
+from lbw_minimal import __version__
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = sorted((ROOT / "lbw_minimal").glob("*.py"))
@@ -71,6 +77,108 @@ def test_a_file_is_one_sitting_and_fits_a_projector(path):
 def test_a_function_fits_on_a_screen(path):
     functions = [n for n in ast.walk(ast.parse(path.read_text())) if isinstance(n, FUNCTIONS)]
     assert not [f.name for f in functions if f.end_lineno - f.lineno >= FUNCTION]
+
+
+def without_encoding(code):
+    """Calls that read or write text in whatever encoding the system has: not UTF-8 on Windows."""
+    for node in ast.walk(ast.parse(code)):
+        if not isinstance(node, ast.Call):
+            continue
+        name = getattr(node.func, "attr", getattr(node.func, "id", ""))
+        words = [a.value for a in node.args if isinstance(a, ast.Constant)]
+        modes = [w for w in words if isinstance(w, str) and re.fullmatch("[rwaxbt+]{1,3}", w)]
+        opens = name in ("open", "fdopen") and not any("b" in mode for mode in modes)
+        opens &= getattr(getattr(node.func, "value", None), "id", "") not in ("os", "av")
+        if (opens or name in ("read_text", "write_text")) and not any(
+            k.arg == "encoding" for k in node.keywords
+        ):
+            yield f"{name}, line {node.lineno}"
+
+
+@every_file
+def test_text_is_read_and_written_in_utf_8_everywhere(path):
+    assert not list(without_encoding(path.read_text()))
+
+
+@pytest.mark.parametrize(
+    ("code", "named"),
+    [
+        ("p.read_text()", False),
+        ("p.read_text(encoding='utf-8')", True),
+        ("p.write_text(text)", False),
+        ("open(p)", False),
+        ("open(p, 'rb')", True),
+        ("p.open('a')", False),
+        ("os.open(p, 0)", True),
+        ("av.open(p)", True),
+    ],
+)
+def test_a_missing_encoding_is_found(code, named):
+    assert (not list(without_encoding(code))) == named
+
+
+SYSTEM = {"resource", "fcntl", "pwd", "grp", "termios", "pty", "msvcrt", "winreg"}
+
+
+@every_file
+def test_no_file_needs_a_module_that_some_system_lacks(path):
+    """Where one is used, it is imported there, and its absence is caught."""
+    tree = ast.parse(path.read_text())
+    tried = {n for t in ast.walk(tree) if isinstance(t, ast.Try) for n in ast.walk(t)}
+    imports = [n for n in ast.walk(tree) if isinstance(n, ast.Import) and n not in tried]
+    assert not SYSTEM & {alias.name for node in imports for alias in node.names}
+
+
+def blocks():
+    """The requirements by the titles of their blocks in requirements.txt."""
+    text = (ROOT / "requirements.txt").read_text()
+    parts = re.split(r"^# (The kit|The course|Its tests)\b.*$", text, flags=re.MULTILINE)
+    lines = [re.sub(r"^#.*$", "", part, flags=re.MULTILINE).split("\n") for part in parts[2::2]]
+    rows = [{str(Requirement(line)) for line in some if line.strip()} for some in lines]
+    return dict(zip(parts[1::2], rows, strict=True))
+
+
+def test_the_package_requires_what_requirements_txt_says():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    more = project["optional-dependencies"]
+    wanted = {"The kit": project["dependencies"], "The course": more["course"],
+              "Its tests": more["test"]}  # fmt: skip
+    assert blocks() == {name: {str(Requirement(r)) for r in some} for name, some in wanted.items()}
+
+
+def test_every_package_of_the_kit_is_installed():
+    """A folder with an __init__.py that is missing from the list is missing from the wheel."""
+    listed = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["packages"]
+    inits = [p for name in ("lbw_minimal", "tasks") for p in (ROOT / name).rglob("__init__.py")]
+    there = {".".join(folder.relative_to(ROOT).parts) for folder in (p.parent for p in inits)}
+    assert there | {"solutions.weights"} == set(listed)
+
+
+def test_the_lock_has_a_version_in_range_of_everything_required():
+    lock = [line for line in (ROOT / "requirements-lock.txt").read_text().splitlines()
+            if not line.startswith("#")]  # fmt: skip
+    pins = {}
+    for pin in map(Requirement, lock):
+        (version,) = pin.specifier
+        assert version.operator == "=="
+        pins[pin.name.lower()] = version.version
+    for some in blocks().values():
+        for needed in map(Requirement, some):
+            assert needed.specifier.contains(pins[needed.name.lower()]), needed
+
+
+def test_the_version_is_everywhere_the_same():
+    citation = yaml.safe_load((ROOT / "CITATION.cff").read_text())
+    newest = re.search(r"^## (\S+)", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)[1]
+    assert citation["version"] == newest == __version__
+
+
+def test_the_workflow_is_yaml_and_tests_every_system():
+    text = (ROOT / ".github" / "workflows" / "check.yml").read_text()
+    jobs = yaml.safe_load(text)["jobs"]
+    systems = {job["runs-on"] for job in jobs.values()}
+    systems |= set(jobs["students"]["strategy"]["matrix"]["system"])
+    assert {re.sub("-.*", "", s) for s in systems if "{" not in s} == {"ubuntu", "macos", "windows"}
 
 
 def public(body):

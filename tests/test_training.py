@@ -279,3 +279,12 @@ def test_unknown_device_is_refused():
 
 def test_cpu_is_a_device():
     assert pick_device("cpu") == torch.device("cpu")
+
+
+def test_a_wait_shows_a_bar_and_a_moment_does_not(capsys, monkeypatch):
+    things = training.counted(iter("abc"), 3, "letters")
+    assert list(things) == ["a", "b", "c"] and not capsys.readouterr().err
+    real = training.progress
+    monkeypatch.setattr(training, "progress", lambda *a, delay: real(*a))  # 3 s have gone by
+    assert list(training.counted(iter("abc"), 3, "letters"))
+    assert "letters: 100%" in capsys.readouterr().err

@@ -53,7 +53,10 @@ def folder(out: Path, task: str, seed: int, change: str = "") -> Path:
 def finished(path: Path, episodes: int) -> bool:
     """Whether a run has ended with that many test episodes."""
     note = path / "metrics.json"
-    return note.exists() and len(json.loads(note.read_text()).get("episodes", ())) == episodes
+    return (
+        note.exists()
+        and len(json.loads(note.read_text(encoding="utf-8")).get("episodes", ())) == episodes
+    )
 
 
 def rests_on(change: str) -> str:
@@ -118,8 +121,8 @@ def run_missing(
 
     def run(job):
         path = folder(out, *job)
-        print(f"running {path.name}", flush=True)
-        with (out / f"{path.name}.log").open("a") as log:
+        print(f"running {path.name}; {path}.log tells how far it is", flush=True)
+        with (out / f"{path.name}.log").open("a", encoding="utf-8") as log:
             line = [sys.executable, *RUN, *command(out, *job, episodes, fast)]
             code = subprocess.run(line, stdout=log, stderr=log).returncode
         if code:
@@ -158,7 +161,7 @@ def run_on_cluster(out: Path, jobs: list[Job], episodes: int) -> None:
             continue
         code, text, files = result
         log = out / f"{path.name}.log"
-        with log.open("a") as f:
+        with log.open("a", encoding="utf-8") as f:
             f.write(text)
         if code:
             failed.append(f"{path}: the run ended with code {code}; see {log}.")
@@ -175,7 +178,9 @@ def run_on_cluster(out: Path, jobs: list[Job], episodes: int) -> None:
 
 def read(out: Path, task: str, seed: int, change: str = "") -> Row:
     """One finished run as a row: its wins, seconds a stage, steps, and R^2 of perception."""
-    metrics = json.loads((folder(out, task, seed, change) / "metrics.json").read_text())
+    metrics = json.loads(
+        (folder(out, task, seed, change) / "metrics.json").read_text(encoding="utf-8")
+    )
     return {
         "task": task,
         "seed": seed,
@@ -185,6 +190,6 @@ def read(out: Path, task: str, seed: int, change: str = "") -> Row:
         "episodes": len(metrics["episodes"]),
         "stages": metrics["stages"],
         "steps": metrics["settings"]["recipe"]["policy_steps"],
-        "memory_mb": metrics["memory_mb"],
+        "memory_mb": metrics.get("memory_mb"),
         "perception": metrics.get("perception"),
     }

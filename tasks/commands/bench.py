@@ -63,11 +63,11 @@ def main(argv: list[str]) -> None:
 
 def contest(what: str, contestants: dict[str, Contestant], seconds: float) -> None:
     """Print how often a second each contestant does it, and the first one's rate over a peer's."""
+    print(f"\n{what}, times a second ({seconds:g} s for each)", flush=True)
     rates: dict[str, list[float]] = {name: [] for name in contestants}
     for _ in range(ROUNDS):
         for name, measure in contestants.items():
             rates[name].append(measure(seconds / ROUNDS))
-    print(f"\n{what}, times a second")
     first, *_ = rates
     for name, values in rates.items():
         ratio = np.median(np.divide(rates[first], values))

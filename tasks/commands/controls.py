@@ -22,7 +22,7 @@ import tasks
 from lbw_minimal import rivals, sac
 from lbw_minimal.imitate import watched
 from lbw_minimal.report import wilson
-from lbw_minimal.training import InputError, write_atomic
+from lbw_minimal.training import InputError, counted, write_atomic
 from tasks.commands import JITTER, Parser, at_least, make_folder
 from tasks.commands.run import TEST_SEED
 from tasks.commands.table import METHODS, markdown
@@ -112,7 +112,8 @@ def play(
 
 def wins(env: gym.Env, robot: Robot, episodes: int, seed: int = TEST_SEED) -> int:
     """Successful episodes, from the starts that follow `seed`."""
-    return sum(play(env, robot, seed + i, whole=False)[0] for i in range(episodes))
+    seeds = counted(range(seed, seed + episodes), episodes, "episodes")
+    return sum(play(env, robot, i, whole=False)[0] for i in seeds)
 
 
 def best(env: gym.Env, robots: list[Robot], trials: int) -> Robot:
@@ -164,7 +165,8 @@ def compare(
         blinded = seen_through(camera)[0]
         found[name] = wins(blinded, trained, episodes)
         blinded.close()
-    own = [play(env, trained, TRIAL_SEED + i) for i in range(library)]
+    seeds = counted(range(TRIAL_SEED, TRIAL_SEED + library), library, "the policy's episodes")
+    own = [play(env, trained, seed) for seed in seeds]
     done = [episode for episode in own if episode[0]] or own
     looks = look_once(np.stack([first for _, _, first, _ in done]), [a for *_, a in done])
     found["looks once, then replays"] = wins(env, looks, episodes)
@@ -219,7 +221,7 @@ def main(argv: list[str]) -> None:
 def method_of(run: Path) -> str:
     """The paper's name of the rival whose run is in that folder. Raises InputError for others."""
     note = run / "settings.json"
-    method = json.loads(note.read_text())["method"] if note.exists() else "lbw"
+    method = json.loads(note.read_text(encoding="utf-8"))["method"] if note.exists() else "lbw"
     if method not in METHODS:
         raise InputError(f"--beside {run}: no run of a rival is there.")
     return METHODS[method][0]

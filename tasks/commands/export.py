@@ -8,7 +8,7 @@ from __future__ import annotations
 import warnings
 
 import tasks
-from lbw_minimal.training import InputError
+from lbw_minimal.training import InputError, counted
 from tasks.commands import Parser
 from tasks.world import film, load_recordings
 
@@ -43,7 +43,7 @@ def main(argv: list[str]) -> None:
         )
     env = tasks.bare(name, embodiment="human")
     episodes = []
-    for recording in recordings:
+    for recording in counted(recordings, len(recordings), "episodes"):
         seed, scatter, actions, *_ = recording
         frames, _, played = film(env, seed, actions, scatter)
         if not played.success[-1]:

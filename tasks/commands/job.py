@@ -19,7 +19,7 @@ import numpy as np
 import torch
 
 import tasks
-from lbw_minimal import classifier, cyclegan, sac, sac_ae, video
+from lbw_minimal import __version__, classifier, cyclegan, sac, sac_ae, video
 from lbw_minimal.imitate import Perception, Recipe, Run, load_perception
 from lbw_minimal.reward import MENDS
 from lbw_minimal.training import InputError, pick_device, write_atomic
@@ -141,6 +141,7 @@ def check(name: str, args: argparse.Namespace, argv: list[str]) -> Job:
     command = shlex.join(["python", "-m", "tasks", name, *argv])
     run.metrics["command"] = command
     run.metrics["settings"] = settings
+    run.metrics["version"] = __version__
     machine = f"{platform.machine()}, {os.cpu_count()} cores, torch {torch.__version__}"
     run.metrics["machine"] = machine
     return Job(name, args, recipe, from_scratch, experts, random, perception, weights, command, run)
@@ -271,7 +272,7 @@ def prepare_folder(out: Path, settings: dict[str, Any], resume: bool) -> Path:
     if resume:
         if not note.exists():
             raise InputError(f"{out}: there is no run to resume here; start it without --resume.")
-        if json.loads(note.read_text()) != settings:
+        if json.loads(note.read_text(encoding="utf-8")) != settings:
             raise InputError(f"{out}: that run had other settings; give those, or another --out.")
         return out
     make_folder(out)

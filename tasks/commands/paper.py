@@ -215,7 +215,7 @@ def over_steps(plan: Plan) -> str:
         for change in ("", *RIVALS):
             paths = [folder(plan.runs, task, s, change) for s in plan.seeds_of(change)]
             logs[task][METHODS[change][0]] = [
-                json.loads((path / "policy_log.json").read_text()) for path in paths
+                json.loads((path / "policy_log.json").read_text(encoding="utf-8")) for path in paths
             ]
     return shown(plan, "steps", figures.over_steps(logs), "Success over environment steps")
 
@@ -235,7 +235,7 @@ def needs_eyes(plan: Plan, change: str) -> str:
                 task, folder(plan.runs, task, 0, change), plan.controls, 0, beside, plan.fast
             )
             write_atomic(path, json.dumps(note, indent=1) + "\n")
-        return json.loads(path.read_text())
+        return json.loads(path.read_text(encoding="utf-8"))
 
     notes = [note_of(task) for task in tasks.TASKS]
     found = {note["task"]: note["success"] for note in notes}
@@ -265,7 +265,7 @@ def perception(plan: Plan) -> str:
         write_atomic(path, json.dumps(found, indent=1) + "\n")
     rows = [
         [f"{name}, {where}", *("-" if s["r2"] is None else f"{s['r2']:.3f}" for s in cells)]
-        for name, found in json.loads(path.read_text()).items()
+        for name, found in json.loads(path.read_text(encoding="utf-8")).items()
         for where in ("translated", "transfer")
         for cells in [[found[where][n] for n in NAMES]]
     ]

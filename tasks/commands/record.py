@@ -13,6 +13,7 @@ import numpy as np
 
 import tasks
 from lbw_minimal import video
+from lbw_minimal.training import counted
 from tasks.commands import JITTER, Parser
 from tasks.world import Recording, expert_takes, random_takes, save_recordings
 from tasks.world.scene import FPS
@@ -47,14 +48,14 @@ def film_human(name: str) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     env = tasks.bare(name, embodiment="human")
     experts = list[Recording]()
-    for film, _, recording in expert_takes(env, EXPERTS):
+    for film, _, recording in counted(expert_takes(env, EXPERTS), EXPERTS, "expert videos"):
         experts.append(recording)
         video.write(folder / f"expert_{len(experts):02d}.mp4", film, FPS)
     save_recordings(folder / "experts.npz", experts)
     # Demonstration and random motion together have Table I's frames.
     frames = tasks.module(name).RECIPE.human_frames - len(experts[0].states)
     takes = random_takes(env, frames, seed=experts[-1].seed + 1, take=20)
-    films, _, recordings = zip(*takes, strict=True)
+    films, _, recordings = zip(*counted(takes, -(-frames // 20), "random motion"), strict=True)
     video.write(folder / "random.mp4", np.concatenate(films), FPS)
     save_recordings(folder / "random.npz", recordings)
     print(f"{name}: {EXPERTS} expert videos and {frames} frames of random motion in {folder}")

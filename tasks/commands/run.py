@@ -7,7 +7,6 @@ In: the human video of the task, or the user's. Out: a folder with weights, logs
 from __future__ import annotations
 
 import json
-import resource
 import shutil
 import time
 from itertools import islice
@@ -22,7 +21,7 @@ import tasks
 from lbw_minimal import classifier, cyclegan, rivals, sac
 from lbw_minimal.imitate import PACE, Perception, imitate, learn_perception
 from lbw_minimal.report import wilson, write_report
-from lbw_minimal.training import InputError, seed_everything
+from lbw_minimal.training import InputError, counted, peak_memory, seed_everything
 from tasks.commands.job import TEST_EPISODES, Job, check, parser
 from tasks.commands.probe import PROBE_SEED, probe
 from tasks.world import TaskEnv
@@ -139,7 +138,8 @@ def test(job: Job, agent: sac.Policy, env: gym.Env) -> tuple[dict[str, Any], str
     metrics = job.run.metrics
     metrics["episodes"] = episodes
     metrics["success"] = {"rate": wins / n, "low": low, "high": high, "episodes": n}
-    metrics["memory_mb"] = round(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+    if most := peak_memory():
+        metrics["memory_mb"] = round(most / 2**20)
     job.run.save()
     return first, scene
 
@@ -152,7 +152,7 @@ def evaluate(agent: sac.Policy, env: gym.Env, n: int) -> tuple[list[dict], dict[
     """
     rows, base = [], cast(TaskEnv, env.unwrapped)
     film, zs, parts, scene = [], [], [], ""
-    for i in range(n):
+    for i in counted(range(n), n, "test episodes"):
         z, _ = env.reset(seed=TEST_SEED + i)
         recorder = mirror(base) if i == 0 else None
         if recorder:
@@ -188,7 +188,9 @@ def report(job: Job, seen: dict[str, Any], first: dict[str, Any], scene: str) ->
         out / "report.html",
         task=job.name,
         **seen,
-        log=json.loads(log.read_text()) if log.exists() else [],  # a replayed policy has none
+        log=json.loads(log.read_text(encoding="utf-8"))
+        if log.exists()
+        else [],  # a replayed policy has none
         episode=first,
         metrics=metrics,
         scene_html=scene,

@@ -52,7 +52,9 @@ class Cycled:
         demo = demo_of("push")
         if not path.exists():
             random = video.read(tasks.VIDEOS / "push" / "random.mp4", whole=True)[0]
-            recipe = json.loads((folder(runs, "push", 0) / "settings.json").read_text())["recipe"]
+            recipe = json.loads(
+                (folder(runs, "push", 0) / "settings.json").read_text(encoding="utf-8")
+            )["recipe"]
             robot = tasks.pace_film("push", 0, recipe["robot_frames"])
             v = [cyclegan.translate(model, frames) for frames in (demo, random)]
             detector, _ = transporter.train(

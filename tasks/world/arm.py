@@ -53,7 +53,7 @@ class Arm:
         flags = client.URDF_USE_INERTIA_FROM_FILE if embodiment == "human" else 0
         with tempfile.TemporaryDirectory(prefix="lbw_arm_") as folder:
             for name, text in {"arm.urdf": self.spec.urdf, **self.spec.meshes}.items():
-                Path(folder, name).write_text(text)
+                Path(folder, name).write_text(text, encoding="utf-8")
             self.body = client.loadURDF(
                 str(Path(folder, "arm.urdf")), self.spec.base, useFixedBase=True, flags=flags
             )

@@ -34,7 +34,7 @@ class ArmSpec:
 def panda() -> ArmSpec:
     """The Panda of pybullet_data, fingers fixed 3 cm apart, drawn with its low-polygon meshes."""
     folder = Path(pybullet_data.getDataPath()) / "franka_panda"
-    urdf = (folder / "panda.urdf").read_text()
+    urdf = (folder / "panda.urdf").read_text(encoding="utf-8")
     # The visual meshes cost ten times the rendering time of the collision meshes.
     urdf = urdf.replace("meshes/visual", "meshes/collision").replace("package://", f"{folder}/")
     # The fingers lie across the line of sight: they hold a pushed object from two sides, and the

@@ -58,7 +58,7 @@ def read_mesh(path: Path | str) -> np.ndarray:
         return data[4:].reshape(-1, 50)[:, 12:48].copy().view("<f4").reshape(-1, 3, 3).astype(float)
     if path.suffix.lower() != ".obj":
         raise ValueError(f"{path.name}: the viewer reads OBJ and binary STL meshes; convert it.")
-    return read_obj(path.read_text(errors="replace"))
+    return read_obj(path.read_text(encoding="utf-8", errors="replace"))
 
 
 def read_obj(text: str) -> np.ndarray:

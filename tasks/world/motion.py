@@ -11,7 +11,7 @@ from itertools import count, islice
 
 import numpy as np
 
-from lbw_minimal.training import InputError
+from lbw_minimal.training import InputError, counted
 from tasks.world.env import LOW, TaskEnv
 from tasks.world.recording import Recording, film
 from tasks.world.scene import DT, SUBSTEPS
@@ -62,7 +62,8 @@ def record_random(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Film `frames` frames of random motion. Returns the frames (T, 84, 84, 3) uint8 and the true
     pixels (T, 4) of tip and object."""
-    films, truth, _ = zip(*random_takes(env, frames, seed, take), strict=True)
+    takes = counted(random_takes(env, frames, seed, take), -(-frames // take), "random motion")
+    films, truth, _ = zip(*takes, strict=True)
     return np.concatenate(films), np.concatenate(truth)
 
 

@@ -10,12 +10,22 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import os
+import struct
 import sys
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import cv2
 import numpy as np
+
+
+def _flush_c() -> None:
+    """C holds a printed line back when stdout is a file; where it cannot be asked for it, it stays.
+
+    Its library is found among what this process has loaded, on Windows by its name.
+    """
+    with contextlib.suppress(OSError, TypeError, AttributeError):
+        ctypes.CDLL("ucrtbase" if sys.platform == "win32" else None).fflush(None)
 
 
 @contextlib.contextmanager
@@ -28,7 +38,7 @@ def _silence() -> Iterator[None]:
     try:
         yield
     finally:
-        ctypes.CDLL(None).fflush(None)  # C still holds the line when stdout is a file
+        _flush_c()
         for stream, copy in enumerate(keep, start=1):
             os.dup2(copy, stream)
             os.close(copy)
@@ -70,6 +80,19 @@ LOOKS = {
 
 Colour = tuple[float, ...]  # red, green, blue, opacity, 0 to 1
 Vector = Sequence[float] | np.ndarray  # (3,)
+
+
+def numbers(image: np.ndarray | tuple, kind: type[np.uint8 | np.float32]) -> np.ndarray:
+    """An image as the camera gives it, as an array of bytes or floats; flat if it was a tuple.
+
+    A PyBullet that was built without NumPy gives tuples. np.asarray asks each number for its type,
+    which takes six times as long as packing all of them at once.
+    """
+    if isinstance(image, tuple):
+        if kind is np.uint8:
+            return np.frombuffer(bytearray(image), kind)
+        image = np.frombuffer(struct.pack(f"{len(image)}f", *image), kind)
+    return np.asarray(image, kind)
 
 
 class Part(NamedTuple):
@@ -222,10 +245,10 @@ class World:
             lightAmbientCoeff=0.65, lightDiffuseCoeff=0.35, lightSpecularCoeff=0.0,
             renderer=self.p.ER_TINY_RENDERER, flags=self.p.ER_NO_SEGMENTATION_MASK,
         )  # fmt: skip
-        depth = np.asarray(depth, np.float32).reshape(size, size)
+        depth = numbers(depth, np.float32).reshape(size, size)
         seen = depth < self.depth
         picture = self.backdrop.copy()
-        picture[seen] = np.asarray(rgba, np.uint8).reshape(size, size, 4)[seen, :3]
+        picture[seen] = numbers(rgba, np.uint8).reshape(size, size, 4)[seen, :3]
         return picture, np.minimum(depth, self.depth)
 
     def position(self, body: int) -> np.ndarray:

@@ -201,8 +201,8 @@ class Recorder:
         dist = Path(meshcat.__file__).parent / "viewer" / "dist"
         return PAGE.format(
             title=html.escape(title),
-            notices=(dist / "main.min.js.LICENSE.txt").read_text(),
-            meshcat=(dist / "main.min.js").read_text(),
+            notices=(dist / "main.min.js.LICENSE.txt").read_text(encoding="utf-8"),
+            meshcat=(dist / "main.min.js").read_text(encoding="utf-8"),
             commands=[base64.b64encode(pack(c)).decode() for c in tape],
             fov=FOV,
             eye=y_up(self.eye),

@@ -44,6 +44,9 @@ def main(argv=None) -> int:
     """Returns the exit code: 2 where there is nothing to grade, 1 if the grader failed on a
     submission or could not write, 130 if it was interrupted."""
     args = _arguments(argv)
+    if not (args.ray or sandbox.holds()):
+        say(f"error: {sandbox.ELSEWHERE}", sys.stderr)
+        return 2
     try:
         entries = submissions(args.folder, args.out)
         ids, chosen = wanted(args.notebooks, entries)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import _thread
 import signal
 import sys
 import threading
@@ -133,10 +134,16 @@ def _within(seconds: int):
     def stop(*_):
         raise TimeoutError(f"no answer within {seconds} s: does a loop never end?")
 
-    before = signal.signal(signal.SIGALRM, stop)
-    signal.alarm(seconds)
+    # Windows has no alarm: there a thread asks for the interrupt, which comes when a line of Python
+    # runs again, so a call that sleeps is waited for.
+    alarm = getattr(signal, "SIGALRM", None)
+    which = alarm or signal.SIGINT
+    timer = threading.Timer(seconds, _thread.interrupt_main, [which])
+    timer.daemon = True
+    before = signal.signal(which, stop)
+    signal.alarm(seconds) if alarm else timer.start()
     try:
         yield
     finally:
-        signal.alarm(0)
-        signal.signal(signal.SIGALRM, before)
+        signal.alarm(0) if alarm else timer.cancel()
+        signal.signal(which, before)

@@ -11,6 +11,7 @@ from __future__ import annotations
 import functools
 import math
 import os
+import platform
 import select
 import shutil
 import socket
@@ -43,8 +44,19 @@ LEAVING = 10  # s for a process to be ended
 TRYING = 30  # s for bubblewrap to start Python
 
 
+ELSEWHERE = (
+    "grading a class runs strangers' code and needs Linux on x86-64 for its sandbox: "
+    "use WSL2 on Windows, or the kit's container"
+)
+
+
 class Lost(Exception):
     """The student's process is gone, or had to go; the message says why, to the student."""
+
+
+def holds() -> bool:
+    """Whether this system can confine a process: the filter of calls knows x86-64's alone."""
+    return sys.platform == "linux" and platform.machine() == "x86_64"
 
 
 def warning() -> str:

@@ -20,6 +20,8 @@ import answer
 import walls
 import wire
 
+del sys.modules["wire"]  # a cell that patches what it finds there patches nothing of ours
+
 
 def run(job: dict, channel) -> None:
     """Define the student's names and call the probe on every input the judge sends."""

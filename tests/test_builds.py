@@ -1,0 +1,107 @@
+"""Two builds of PyBullet, with NumPy inside and without, give the same frames and states.
+
+Each runs in a process of its own. `make builds` puts the one that .venv lacks into .venv-bullet.
+"""
+
+import hashlib
+import os
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pybullet
+import pytest
+
+import tasks
+from solutions.__main__ import ROOT
+from tasks import TASKS
+from tasks.world.scene import numbers
+
+OTHER = ROOT / ".venv-bullet"
+WORKER = """
+import hashlib, sys
+import numpy as np, pybullet, tasks
+from tasks.world import expert_actions
+
+def digest(task, arm):
+    env = tasks.bare(task, embodiment=arm, observation="state")
+    sha = hashlib.sha256()
+    for seed in range(3):
+        env.reset(seed=seed, options={"scatter": True})
+        sha.update(env.world.render())
+    env.reset(seed=3)
+    for i, action in enumerate(expert_actions(env, np.random.default_rng(0))):
+        sha.update(env.step(action)[0])
+        if i % 5 == 0:
+            sha.update(env.world.render())
+        sha.update(np.array(env.world.p.getJointStates(env.arm.body, env.arm.joints), object)[:, 0]
+                   .astype(float))
+        sha.update(env.object_position())
+    env.close()
+    return sha.hexdigest()
+
+print(pybullet.isNumpyEnabled(), flush=True)
+for line in sys.stdin:
+    print(eval(line), flush=True)
+"""
+
+
+class Build:
+    """A process with one build of PyBullet, the one found first on `path`."""
+
+    def __init__(self, path):
+        env = os.environ | {"PYTHONPATH": f"{path}{os.pathsep}{ROOT}", "OMP_NUM_THREADS": "1"}
+        self.process = subprocess.Popen([sys.executable, "-c", WORKER], env=env, text=True,
+                                        stdin=subprocess.PIPE, stdout=subprocess.PIPE)  # fmt: skip
+        self.has_numpy = self.process.stdout.readline().strip() == "1"
+
+    def ask(self, expression):
+        self.process.stdin.write(f"{expression}\n")
+        self.process.stdin.flush()
+        return self.process.stdout.readline().strip()
+
+
+@pytest.fixture(scope="module")
+def builds():
+    if not OTHER.is_dir():
+        pytest.skip("the other build is not installed; `make builds` brings it")
+    both = [Build(ROOT), Build(OTHER)]
+    if not both[0].has_numpy:
+        pytest.skip("for this Python and system there is one build alone")
+    yield both
+    for build in both:
+        build.process.kill()
+        build.process.wait()
+
+
+@pytest.mark.parametrize("arm", ["robot", "human"])
+@pytest.mark.parametrize("task", TASKS)
+def test_frames_and_states_of_an_episode_are_the_same(builds, task, arm):
+    first, second = (build.ask(f"digest({task!r}, {arm!r})") for build in builds)
+    assert len(first) == len(hashlib.sha256().hexdigest())
+    assert first == second
+
+
+def test_one_build_has_numpy_inside_and_the_other_has_not(builds):
+    assert [build.has_numpy for build in builds] == [True, False]
+
+
+def test_a_frame_is_the_same_from_tuples_and_their_reading_is_cheap(monkeypatch):
+    """As PyBullet returns them without NumPy inside. Read number by number, an image took 6 ms."""
+    world = tasks.bare("push").world
+    want, times = world.render(), {}
+    real = pybullet.getCameraImage
+
+    def tuples(*args, **kwargs):
+        return [tuple(np.ravel(x).tolist()) if np.ndim(x) else x for x in real(*args, **kwargs)]
+
+    picture = tuples(168, 168, world.view, world.projection, physicsClientId=world.client)
+    for name, read in (("ours", numbers), ("one by one", np.asarray)):
+        start = time.process_time()
+        for _ in range(10):
+            read(picture[2], np.uint8), read(picture[3], np.float32)
+        times[name] = time.process_time() - start
+    assert times["ours"] < 0.5 * times["one by one"]
+    monkeypatch.setattr(pybullet, "getCameraImage", tuples)
+    assert np.array_equal(world.render(), want)
