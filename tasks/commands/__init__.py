@@ -26,6 +26,7 @@ COMMANDS = {  # each a file in this folder
     "gallery": "one page with every task's scene, demonstration and rollout",
     "viewer": "a task's scene as a page that turns with the mouse",
     "probe": "how well the keypoints tell where things are",
+    "eyes": "train what finds tip and object in a person's own clip, and measure it",
     "controls": "the policy beside robots that see little or nothing",
     "robustness": "success under a moved camera, other light and colour",
     "bench": "steps, iterations and updates a second on this machine",

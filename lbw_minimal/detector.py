@@ -1,0 +1,220 @@
+"""Eyes for any clip: where the tip of the arm is, and the object that it moves. Not from the paper.
+
+A small network that has seen nothing but drawings (`drawings.py`) looks at a frame and, for
+reference, at its clip's median, first and last frame: what differs from those is arm or object.
+Both have a place, or are nowhere. The clip is looked at twice: as a whole, and closer where
+something happens.
+In: frames (T, H, W, 3) uint8 of one clip with a still camera. Out: `Found`, in pixels of these
+frames from their left and upper edge; `refine` then follows the object by its own texture.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import torch
+from torch import nn
+
+from lbw_minimal.corners import followed
+from lbw_minimal.detector_networks import Network, loss, read
+from lbw_minimal.drawings import Clip, draw_clip
+from lbw_minimal.drawn_shapes import SIZE
+from lbw_minimal.images import median_frame, to_images
+from lbw_minimal.training import (
+    Checkpoint,
+    InputError,
+    load_weights,
+    pick_device,
+    progress,
+    save_state,
+    seed_everything,
+)
+
+SURE = 0.5  # more is taken for there
+MOST = 60  # frames that the median is taken of, spread over the clip
+CLOSER = 0.8  # of the frame's longer side: a second look pays if it takes in less than this
+BATCH = 8
+LEARNING_RATE = 3e-3
+SETTLE = 0.4  # share of the training, at its end, in which the learning rate falls to 0
+POOL = 96  # clips that batches are drawn from
+EVERY = 4  # iterations until the oldest of them makes room for a new one: drawing takes long
+LOG_EVERY = 50  # iterations
+
+
+@dataclass(frozen=True)
+class Found:
+    """Tip and object in T frames: pixels from the left and the upper edge, and how sure, 0 to 1.
+
+    A place is a number even where the sureness says that nothing is there.
+    """
+
+    tip: np.ndarray  # (T, 2) float32
+    object: np.ndarray  # (T, 2) float32
+    tip_sure: np.ndarray  # (T,) float32
+    object_sure: np.ndarray  # (T,) float32
+
+
+class Detector:
+    """Finds tip and object in clips, with a network that `train` taught."""
+
+    def __init__(self, network: Network):
+        self.network = network.eval().requires_grad_(False)
+
+    def detect(self, frames: np.ndarray) -> Found:
+        """Tip and object in the frames (T, H, W, 3) uint8 of one clip with a still camera.
+
+        Raises InputError for frames of another shape or type.
+        """
+        if frames.ndim != 4 or frames.shape[3] != 3 or frames.dtype != np.uint8 or not len(frames):
+            raise InputError(
+                f"frames are {frames.shape} {frames.dtype}; give a clip, (T, H, W, 3) uint8."
+            )
+        place, sure = self._look(frames)
+        left, top, side = _closer(place, sure, frames.shape[1:3])
+        if side < CLOSER * max(frames.shape[1:3]):
+            near, near_sure = self._look(frames[:, top : top + side, left : left + side])
+            better = (near_sure > SURE) | (near_sure > sure)
+            place = np.where(better[..., None], near + np.array([left, top], np.float32), place)
+            sure = np.where(better, near_sure, sure)
+        return Found(place[:, 0], place[:, 1], sure[:, 0], sure[:, 1])
+
+    @torch.inference_mode()
+    def _look(self, frames):
+        """Places (T, 2, 2) in pixels and sureness (T, 2)."""
+        small, scale, corner = _fitted(frames)
+        around = references(small)
+        device, logits = next(self.network.parameters()).device, []
+        for i in range(0, len(small), 64):
+            images = to_images(with_references(small[i : i + 64], around), device)
+            logits.append(self.network(images)[0].cpu())
+        place, sure = read(torch.cat(logits))
+        return (place.numpy() - corner) / scale, sure.numpy()
+
+    def save(self, path: Path | str) -> None:
+        """Write the weights as half-precision numbers, atomically."""
+        half = {name: value.half() for name, value in self.network.state_dict().items()}
+        save_state(path, {"kind": "eyes", "task": "any", "model": half})
+
+    @staticmethod
+    def load(path: Path | str) -> Detector:
+        """The detector in a file, on the CPU. Raises InputError if the file holds another thing."""
+        network = Network()
+        network.load_state_dict(load_weights(path, "eyes", "a detector", None)["model"])
+        return Detector(network)
+
+
+def refine(frames: np.ndarray, found: Found) -> Found:
+    """Found, with the object's places as its own corners moved, where these can be followed."""
+    sure = found.object_sure
+    path, known = followed(frames, np.where(sure[:, None] > SURE, found.object, np.nan))
+    level = np.median(sure[known & (sure > SURE)]) if known.any() else 0
+    return replace(
+        found,
+        object=np.where(known[:, None], path, found.object).astype(np.float32),
+        object_sure=np.where(known, np.maximum(sure, level), sure).astype(np.float32),
+    )
+
+
+def _closer(place, sure, shape):
+    """The square (left, top, side) in which tip and object are when they are found."""
+    h, w = shape
+    tip, object_ = (place[:, i][sure[:, i] > SURE] for i in (0, 1))
+    if len(object_) < 3:
+        return 0, 0, max(h, w)
+    low, high = np.percentile(np.concatenate([object_, tip]), (2, 98), axis=0)
+    side = round(1.5 * (high - low).max() + 0.3 * max(h, w))
+    left, top = np.round((low + high) / 2 - side / 2).astype(int)
+    return max(0, min(left, w - side)), max(0, min(top, h - side)), side
+
+
+def _fitted(frames):
+    """Frames (T, 84, 84, 3) that show all of `frames` between black bars, the scale, the corner."""
+    h, w = frames.shape[1:3]
+    scale = SIZE / max(h, w)
+    size = max(1, round(w * scale)), max(1, round(h * scale))
+    left, top = (SIZE - size[0]) // 2, (SIZE - size[1]) // 2
+    out = np.zeros((len(frames), SIZE, SIZE, 3), np.uint8)
+    for small, frame in zip(out, frames, strict=True):
+        how = cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR
+        small[top : top + size[1], left : left + size[0]] = cv2.resize(
+            frame, size, interpolation=how
+        )
+    scales, corner = [size[0] / w, size[1] / h], [left, top]
+    return out, np.array(scales, np.float32), np.array(corner, np.float32)
+
+
+def references(frames: np.ndarray) -> np.ndarray:
+    """The clip's median, first and last frame, (3, H, W, 3) uint8, of frames (T, H, W, 3)."""
+    some = frames[np.linspace(0, len(frames) - 1, min(len(frames), MOST)).round().astype(int)]
+    return np.stack([median_frame(some)[0].astype(np.uint8), frames[0], frames[-1]])
+
+
+def with_references(frames: np.ndarray, around: np.ndarray) -> np.ndarray:
+    """Frames (B, H, W, 3) with the references (3, H, W, 3) behind them: (B, H, W, 12)."""
+    return np.concatenate([frames, *(np.broadcast_to(one, frames.shape) for one in around)], axis=3)
+
+
+class _Pool:
+    """The clips that batches are drawn from; clip i is the same whenever it is drawn."""
+
+    def __init__(self, seed):
+        self.seed, self.clips = seed, dict[int, tuple[Clip, np.ndarray]]()
+
+    def batch(self, step, rng):
+        """Images (B, 12, 84, 84), places (B, 2, 2) and masks (B, 2, 42, 42) for an iteration."""
+        wanted = range(step // EVERY, step // EVERY + POOL)
+        for i in set(self.clips) - set(wanted):
+            del self.clips[i]
+        for i in set(wanted) - set(self.clips):
+            clip = draw_clip(np.random.default_rng([self.seed, i]))
+            self.clips[i] = clip, references(clip.frames)
+        images, places, masks = [], [], []
+        for i in rng.choice(wanted, BATCH, replace=False):
+            clip, around = self.clips[int(i)]
+            t = rng.integers(len(clip.frames))
+            if rng.random() < 0.5:
+                around = around[[0, 2, 1]]  # as if the clip ran backwards
+            images.append(with_references(clip.frames[t : t + 1], around))
+            places.append(np.stack([clip.tip[t], clip.object[t]]))
+            masks.append(clip.masks[t])
+        shown = torch.from_numpy(np.stack(masks)).permute(0, 3, 1, 2).float() / 255
+        return to_images(np.concatenate(images)), torch.from_numpy(np.stack(places)), shown
+
+
+def train(
+    *, iterations: int, seed: int, device: str = "cpu", checkpoint: Checkpoint | None = None
+) -> tuple[Detector, list[dict]]:
+    """Teach a detector with drawings. Returns it and a log: step, and the mean loss up to there."""
+    checkpoint = checkpoint or Checkpoint(None)
+    to, rng = pick_device(device), seed_everything(seed)
+    network = Network().to(to).train()
+    optimizer = torch.optim.AdamW(network.parameters(), betas=(0.9, 0.99), weight_decay=0.01)
+    now, state = checkpoint.resume(
+        dict(network=network, optimizer=optimizer, rng=rng), step=0, log=[], sum=0.0
+    )
+    pool, bar = _Pool(seed), progress(iterations, "eyes", now.step)
+    while now.step < iterations:
+        # Falling only at the end, the rate up to there does not depend on how long it all takes.
+        left = (1 - now.step / iterations) / SETTLE
+        rate = LEARNING_RATE * min(1.0, (now.step + 1) / 100, left)
+        optimizer.param_groups[0]["lr"] = rate
+        images, places, masks = pool.batch(now.step, rng)
+        # Channels last are a fifth faster on a CPU.
+        said = network(images.to(to).contiguous(memory_format=torch.channels_last))
+        error = loss(*said, places, masks.to(to))
+        optimizer.zero_grad()
+        error.backward()
+        nn.utils.clip_grad_norm_(network.parameters(), 1.0)
+        optimizer.step()
+        now.step += 1
+        now.sum += error.item()
+        bar.update()
+        if now.step % LOG_EVERY == 0:
+            now.log.append({"step": now.step, "loss": round(now.sum / LOG_EVERY, 4)})
+            now.sum = 0.0
+        checkpoint.save(state, force=now.step == iterations)
+    bar.close()
+    return Detector(network), now.log

@@ -1,0 +1,323 @@
+"""Drawings of an arm that moves a thing, in front of anything: what the detector learns from.
+
+Not from the paper. No two clips share their room, light, person, hand, tool, thing or way, so all
+that a detector can rely on is what they have in common: an arm reaches into the picture, its tip
+touches something, and that moves. Nothing is copied from a real video, and nothing has to look
+real: breadth is what counts.
+In: a NumPy generator. Out: clips of 84x84 frames, and the true places of tip and object.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from lbw_minimal import drawn_shapes as draw
+from lbw_minimal.drawn_shapes import ROUND, SIZE, THINGS, a_colour, a_surface
+
+FRAMES = 12  # of a clip: enough for a median that does without most of the arm
+HIDDEN = 0.15  # a thing of which less than this share is seen is nowhere
+# Stories and how often they are told. In the last three something is missing, and the detector has
+# to say so. In "alone" a thing moves that nobody touches.
+STORIES = {
+    "push": 0.36, "carry": 0.20, "hit": 0.12, "drawer": 0.14,
+    "reach": 0.10, "alone": 0.04, "nothing": 0.04,
+}  # fmt: skip
+# s at most: rest, approach, rest, move, rest, retreat, rest
+PHASES = np.array([0.25, 0.8, 0.25, 1.4, 0.4, 0.7, 0.3])
+Draw = Callable[[int], np.ndarray]  # a frame's number -> a layer
+
+
+class Clip(NamedTuple):
+    """A drawn clip; places in pixels from the left and the upper edge, nan where none is seen."""
+
+    frames: np.ndarray  # (T, 84, 84, 3) uint8
+    tip: np.ndarray  # (T, 2) float32
+    object: np.ndarray  # (T, 2) float32
+    # How much of each cell, 2 x 2 pixels, is arm and how much is object, in 0-255.
+    masks: np.ndarray  # (T, 42, 42, 2) uint8
+
+
+class _Story(NamedTuple):
+    """What happens, before a camera sees it; places in pixels."""
+
+    kind: str
+    tip: np.ndarray  # (T, 2)
+    shoulder: np.ndarray  # (T, 2)
+    object: np.ndarray  # (T, 2)
+    half: np.ndarray  # (2,), half the object's width and height
+    closed: np.ndarray  # (2,), where a drawer's front is when it is closed
+
+
+# What happens
+
+
+def _ease(t):
+    t = np.clip(t, 0, 1)
+    return t**3 * (10 - 15 * t + 6 * t**2)  # minimum jerk, as a hand moves
+
+
+def _story(rng, kind, T):
+    """Arms come from the left, from above and from below; the camera mirrors half of the clips."""
+    half = np.exp(rng.uniform(np.log(1.3), np.log(7.5)) + rng.normal(0, 0.25, 2))
+    if kind == "drawer":
+        half = rng.uniform((1, 2), (8, 12))
+    angle = rng.normal(0, 0.2) if rng.random() < 0.75 else rng.uniform(-np.pi, np.pi)
+    ahead = draw.turned(np.array([rng.choice([1, -1], p=[0.75, 0.25]), 0]), angle)
+    way = ahead * rng.uniform(7, 45)
+    low, high = np.maximum(10, 10 - way), np.minimum(SIZE - 6, SIZE - 6 - way)
+    start = rng.uniform(np.minimum(low, high), np.maximum(low, high))
+    if rng.random() < 0.7:  # a table is in the lower half of the picture
+        start[1] = max(start[1], rng.uniform(40, 74))
+    if kind in ("push", "hit"):
+        beside = -ahead * (half @ np.abs(ahead)) + (0, half[1] * rng.uniform(-0.8, 0.5))
+    else:
+        beside = half * rng.uniform(-1.1, 1.1, 2)
+    low, high = (((-45, -35), (5, 45)), ((0, -70), (SIZE, -8)), ((-20, 92), (104, 150)))[
+        rng.choice(3, p=[0.6, 0.25, 0.15])
+    ]
+    shoulder = rng.uniform(low, high)
+    arm = start + beside - shoulder
+    comes = rng.random() < 0.3  # from outside the picture
+    before = -arm * rng.uniform(0.6, 1.0) if comes else rng.normal((-8, -16), 9)
+    after = -arm * rng.uniform(0.1, 0.9) if rng.random() < 0.5 else rng.normal((-5, -12), 8)
+    time = np.linspace(0, 1, T)[:, None]
+    begin, approach, move, retreat = _phases(rng, time)
+    slid = move
+    if kind == "hit":  # the object slides on, slower and slower
+        slid = 1 - (1 - np.clip((time - begin) / (1 - begin), 0, 1)) ** 2
+        move = move * min(1.0, 4 / np.linalg.norm(way))
+    bow = rng.uniform(0, 100) * (kind == "carry" and rng.random() < 0.3)  # lifted, put down again
+    object_ = start + way * slid - np.array([0, bow]) * slid * (1 - slid)
+    held = object_ + beside if kind == "carry" else start + beside + way * move
+    tip = held + before * (1 - approach) + after * retreat
+    lean = 1.0 if comes else rng.uniform(0, 0.4)
+    shoulder = shoulder + lean * (tip - start - beside)
+    return _Story(kind, tip, shoulder, object_, half, start + way * (way[0] > 0))
+
+
+def _phases(rng, time):
+    """When the move begins, and how far approach, move and retreat are, 0 to 1."""
+    seconds = PHASES * rng.uniform(0, 1, 7) + (0, 0.1, 0, 0.3, 0, 0.1, 0)
+    if rng.random() < 0.25:
+        seconds[:2] = 1e-3  # the clip begins with the touch
+    if rng.random() < 0.6:
+        seconds[5:] = 1e-3  # and ends with it
+    ends = np.cumsum(seconds) / seconds.sum()
+    begins = ends - seconds / seconds.sum()
+    steps = (_ease((time - begins[i]) / (ends[i] - begins[i])) for i in (1, 3, 5))
+    return begins[3], *steps
+
+
+# What there is to be seen
+
+
+def _room(rng, story):
+    """What stands still, (84, 84, 3) float32, and its colour where the object begins."""
+    layer = draw.empty() + np.array([*a_colour(rng), 255]).astype(np.uint8)
+    _clutter(rng, layer, rng.integers(0, 7), (0, 0), (SIZE, 50))
+    picture = layer[..., :3] * a_surface(rng, rng.uniform(0, 0.06))
+    if rng.random() < 0.85:
+        foot = story.object[:, 1].min() + story.half[1]
+        top = foot - rng.uniform(0, 12) if rng.random() < 0.75 else rng.uniform(-30, foot - 10)
+        left, right = rng.uniform(-50, 15), rng.uniform(SIZE - 15, SIZE + 50)
+        bottom, wide, tilt = top + rng.uniform(12, 90), rng.uniform(0, 25), rng.normal(0, 3)
+        corners = [(left, top - tilt), (right, top + tilt), (right + wide, bottom),
+                   (left - wide, bottom)]  # fmt: skip
+        layer = draw.empty() + np.array([*a_colour(rng), 255]).astype(np.uint8)
+        _clutter(rng, layer, rng.integers(0, 4), (0, max(top, 0)), (SIZE, SIZE))
+        wood = layer[..., :3] * a_surface(rng, rng.uniform(0, 0.08))
+        table = draw.empty()
+        draw.polygon(table, np.array(corners), np.zeros(3))
+        share = table[..., 3:] / np.float32(255)
+        picture = picture * (1 - share) + wood * share
+    x, y = np.clip(story.object[0], 0, SIZE - 1).astype(int)
+    return picture, picture[y, x]
+
+
+def _clutter(rng, layer, count, low, high):
+    """Things that stand about, some of them much like the one that will move, and long edges."""
+    for _ in range(count):
+        at, colour, chance = rng.uniform(low, high), a_colour(rng), rng.random()
+        if chance < 0.4:
+            half, colours = rng.uniform(1.5, 9, 2), (colour, a_colour(rng))
+            draw.thing(layer, rng.choice(THINGS), at, half, colours, rng.normal(0, 0.3))
+        elif chance < 0.7:
+            draw.thing(layer, "front", at, rng.uniform((3, 3), (35, 25)), (colour, colour))
+        else:
+            r = rng.uniform(0.4, 2)
+            draw.stick(layer, at, at + rng.normal(0, 40, 2), r, r, colour)
+
+
+def _object(rng, story, ground) -> Draw:
+    """The object; in a third of the clips it is hard to tell from the ground behind it."""
+    colour = a_colour(rng, ground if rng.random() < 0.35 else None)
+    colours = (colour, colour if rng.random() < 0.5 else a_colour(rng, colour))
+    kind = rng.choice(THINGS)
+    if story.kind == "drawer":
+        kind = rng.choice(["front", "door"], p=[0.7, 0.3])
+    turn, spin = rng.normal(0, 0.15), rng.normal(0, 0.03) * (kind == "flat")
+    tall, hinge = story.half * (0, 1), story.closed + rng.uniform((4, -4), (25, 4))
+
+    def drawn(t):
+        layer, at = draw.empty(), story.object[t]
+        if kind == "door":  # seen from the side, it gets narrower as it closes
+            draw.polygon(
+                layer, np.stack([hinge - tall, at - tall, at + tall, hinge + tall]), colour
+            )
+            draw.thing(layer, "front", at, story.half * (0.3, 0.5), colours[::-1])
+        elif kind == "front":
+            h = 0.8 * tall
+            closed = story.closed
+            draw.polygon(layer, np.stack([at - h, closed - h, closed + h, at + h]), colour * 0.6)
+            draw.thing(layer, "front", at, story.half, colours)
+        else:
+            draw.thing(layer, kind, at, story.half, colours, turn + spin * t)
+        return layer
+
+    return drawn
+
+
+def _cabinet(rng, story, ground):
+    """What a drawer slides into."""
+    layer, wide, tall = draw.empty(), rng.uniform(4, 30), rng.uniform(1.05, 3)
+    half = np.array([wide, story.half[1] * tall])
+    colour = a_colour(rng, ground if rng.random() < 0.3 else None)
+    at = story.closed + half * (1, rng.uniform(-0.4, 0.4))
+    draw.thing(layer, "front", at, half, (colour, colour * 0.95))
+    return layer
+
+
+def _mark(rng, story):
+    """A spot where the object has to get to."""
+    layer, r = draw.empty(), rng.uniform(2, 7)
+    at = story.object[-1] + rng.normal(0, 2, 2) + (0, story.half[1])
+    draw.polygon(layer, at + ROUND * (r, r * rng.uniform(0.2, 1)), a_colour(rng))
+    return layer
+
+
+def _bystander(rng, T) -> Draw:
+    """Something that moves and has nothing to do with the arm."""
+    at, swing, pace = rng.uniform(0, SIZE, 2), rng.normal(0, 20, 2), rng.uniform(2, 12)
+    kind, half, colours = rng.choice(THINGS), rng.uniform(1.5, 6, 2), (a_colour(rng), a_colour(rng))
+
+    def drawn(t):
+        layer = draw.empty()
+        draw.thing(layer, kind, at + swing * np.sin(pace * t / T), half, colours)
+        return layer
+
+    return drawn
+
+
+# The clip
+
+
+def draw_clip(rng: np.random.Generator, T: int = FRAMES, kind: str | None = None) -> Clip:
+    """A clip of T frames; `kind`, one of STORIES, is drawn by chance if it is None."""
+    kind = kind or str(rng.choice(list(STORIES), p=list(STORIES.values())))
+    moves, has_arm = kind not in ("reach", "nothing"), kind not in ("alone", "nothing")
+    story = _story(rng, kind, T)
+    if not moves:
+        story = story._replace(object=story.object[:1].repeat(T, 0))
+    room, ground = _room(rng, story)
+    if rng.random() < 0.35:
+        room = draw.over(room, _mark(rng, story))
+    if kind == "drawer":
+        room = draw.over(room, _cabinet(rng, story, ground))
+    object_ = _object(rng, story, ground) if moves or rng.random() < 0.5 else None
+    bystander = _bystander(rng, T) if rng.random() < 0.12 else None
+    reach = np.linalg.norm(story.tip - story.shoulder, axis=1).max()
+    person = draw.Person(rng, reach) if has_arm else None
+    in_front, shade = rng.random() < 0.5, rng.uniform(0, 0.5) * (rng.random() < 0.6)
+    fall, soft = rng.normal((0, 8), 12), rng.uniform(0.5, 5)
+    pictures, masks = [], []
+    for t in range(T):
+        picture = draw.over(room, bystander(t)) if bystander else room
+        limb = person.draw(story.tip[t], story.shoulder[t], t / T) if person else draw.empty()
+        thing = object_(t) if object_ else draw.empty()
+        picture = picture * _lit(limb, shade, fall, soft)
+        for layer in (limb, thing) if in_front else (thing, limb):
+            picture = draw.over(picture, layer)
+        pictures.append(picture)
+        unhidden = thing[..., 3] * (in_front | (limb[..., 3] < 128)) * moves
+        masks.append(np.stack([limb[..., 3], unhidden], 2))
+    seen = np.stack(masks)[..., 1].sum((1, 2), dtype=int)
+    shown = seen > HIDDEN * seen.max()
+    places = np.stack([np.where(has_arm, story.tip, np.nan),
+                       np.where(shown[:, None], story.object, np.nan)])  # fmt: skip
+    return _camera(rng, pictures, masks, places)
+
+
+def _lit(layer, shade, fall, soft):
+    """The light (84, 84, 1) that a layer leaves behind it, at most 1."""
+    if not shade:
+        return 1
+    move = np.array([[1, 0, fall[0]], [0, 1, fall[1]]], np.float32)
+    dark = cv2.GaussianBlur(cv2.warpAffine(layer[..., 3], move, (SIZE, SIZE)), (0, 0), soft)
+    return 1 - np.float32(shade / 255) * dark[..., None]
+
+
+def _camera(rng, pictures, masks, places):
+    """What a camera makes of T pictures and masks, (84, 84, 3 or 2), and of places (2, T, 2)."""
+    T = len(pictures)
+    # It stands and looks somewhat elsewhere, and may shake a little.
+    zoom = np.exp(rng.normal(-0.05, 0.18))
+    view = cv2.getRotationMatrix2D((SIZE / 2, SIZE / 2), rng.normal(0, 6), zoom)
+    view[:, 2] += rng.normal(0, 4, 2)
+    view[0, 1] += rng.normal(0, 0.06)
+    shake = rng.normal(0, 0.3, (T, 2)) * (rng.random() < 0.15)
+    views = [view + [[0, 0, x], [0, 0, y]] for x, y in shake]
+    frames, masks = (
+        np.stack(
+            [
+                cv2.warpAffine(picture, view, (SIZE, SIZE), borderMode=cv2.BORDER_REFLECT)
+                for picture, view in zip(pictures, views, strict=True)
+            ]
+        )
+        for pictures in (pictures, masks)
+    )
+    places = (places - 0.5) @ view[:, :2].T + view[:, 2] + shake + 0.5
+    frames = _developed(rng, frames)
+    edge = np.zeros(2, int)
+    if rng.random() < 0.2:  # black bars beside an upright clip, or above and below a wide one
+        edge[rng.integers(2)] = rng.integers(4, 22)
+        x, y = edge
+        for picture in (frames, masks):
+            picture[:, :, :x] = picture[:, :, SIZE - x :] = 0
+            picture[:, :y] = picture[:, SIZE - y :] = 0
+    places[~((places >= edge) & (places < SIZE - edge)).all(2)] = np.nan
+    if rng.random() < 0.5:
+        frames, masks = frames[:, :, ::-1], masks[:, :, ::-1]
+        places[..., 0] = SIZE - places[..., 0]
+    if rng.random() < 0.08:  # a loop that begins in its middle
+        cut = rng.integers(1, T)
+        frames, masks = np.roll(frames, cut, 0), np.roll(masks, cut, 0)
+        places = np.roll(places, cut, 1)
+    half = (SIZE // 2, SIZE // 2)
+    masks = np.stack([cv2.resize(mask, half, interpolation=cv2.INTER_AREA) for mask in masks])
+    return Clip(np.ascontiguousarray(frames), *places.astype(np.float32), masks)
+
+
+def _developed(rng, frames):
+    """Frames (T, 84, 84, 3) uint8 with light, colour cast, flicker, noise, blur, compression."""
+    T = len(frames)
+    cast = np.exp(rng.normal(0, 0.25) + rng.normal(0, 0.07, 3))
+    flicker = 1 + rng.normal(0, 0.03, (T, 1, 1, 1)) * (rng.random() < 0.3)
+    slope = 1 + rng.normal(0, 0.12) * np.linspace(-1, 1, SIZE)[:, None]
+    frames = frames * np.float32(cast * flicker * slope) + np.float32(rng.normal(0, 12))
+    if rng.random() < 0.6:
+        noise = rng.standard_normal(frames.shape, np.float32)
+        frames += np.float32(rng.uniform(0, 8)) * noise
+    blur = rng.uniform(0.3, 1.1) * (rng.random() < 0.4)
+    quality = [cv2.IMWRITE_JPEG_QUALITY, int(rng.uniform(25, 90))] if rng.random() < 0.4 else None
+    frames = np.clip(frames, 0, 255).astype(np.uint8)
+    for t in range(T):
+        if blur:
+            frames[t] = cv2.GaussianBlur(frames[t], (0, 0), blur)
+        if quality:
+            file = cv2.imencode(".jpg", frames[t], quality)[1]
+            frames[t] = cv2.imdecode(file, cv2.IMREAD_COLOR)
+    return frames
