@@ -19,7 +19,7 @@ import torch
 from torch import nn
 
 from lbw_minimal.corners import followed
-from lbw_minimal.detector_networks import Network, loss, read
+from lbw_minimal.detector_networks import Network, both_ways, loss, read
 from lbw_minimal.drawings import Clip, draw_clip
 from lbw_minimal.drawn_shapes import SIZE
 from lbw_minimal.images import median_frame, to_images
@@ -89,7 +89,7 @@ class Detector:
         device, logits = next(self.network.parameters()).device, []
         for i in range(0, len(small), 64):
             images = to_images(with_references(small[i : i + 64], around), device)
-            logits.append(self.network(images)[0].cpu())
+            logits.append(both_ways(self.network, images).cpu())
         place, sure = read(torch.cat(logits))
         return (place.numpy() - corner) / scale, sure.numpy()
 

@@ -16,6 +16,7 @@ from lbw_minimal.drawn_shapes import SIZE
 WIDTH = 32  # channels
 CELLS = 42  # of the map, each way: a cell is two pixels wide
 SIGMA = 2.0  # pixels, of the Gaussian that the map is taught
+CUT = 0.05  # the chance that a place has nothing to do with that in the frame before
 MASK_WEIGHT = 10.0  # of the masks' mean error in the loss
 WINDOW = 3  # cells to each side of the peak whose mean is the place
 
@@ -91,18 +92,47 @@ def loss(
     return where + MASK_WEIGHT * F.binary_cross_entropy_with_logits(mask_logits, masks)
 
 
-def read(logits: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-    """Places (B, 2, 2) and sureness (B, 2) in 0..1 of logits (B, 2, 42 * 42 + 1).
+def both_ways(network: Network, images: torch.Tensor) -> torch.Tensor:
+    """Logits (B, 2, 42 * 42 + 1) of images (B, 12, 84, 84), averaged over them and their mirror
+    images: the errors of the two differ."""
+    logits, mirrored = network(images)[0], network(images.flip(3))[0]
+    maps = mirrored[..., :-1].unflatten(2, (CELLS, CELLS)).flip(3).flatten(2)
+    return (logits + torch.cat([maps, mirrored[..., -1:]], 2)) / 2
 
-    The place is the mean of the cells about the map's peak, the sureness what they hold of the
-    probability: little, if there are other peaks, or if it is nowhere.
+
+def together(p: torch.Tensor) -> torch.Tensor:
+    """Maps p (T, 2, 42, 42) of successive frames, weighed by what is near in the frames around.
+
+    A hidden Markov model's forward-backward pass, with cells as states: a tip or an object moves a
+    little from frame to frame, and now and then, in a cut, anywhere.
     """
-    p = logits.float().softmax(2)[..., :-1].unflatten(2, (CELLS, CELLS))  # (B, 2, 42, 42)
-    peak = F.avg_pool2d(p, 3, 1, 1).flatten(2).argmax(2)  # (B, 2)
-    cell = torch.arange(CELLS, device=p.device)
-    near_y = (cell - peak[..., None] // CELLS).abs() <= WINDOW  # (B, 2, 42)
+
+    def spread(one):
+        near = F.avg_pool2d(F.avg_pool2d(one, 3, 1, 1), 3, 1, 1)
+        one = (1 - CUT) * near + CUT * one.mean((1, 2), keepdim=True)
+        return one / one.sum((1, 2), keepdim=True)
+
+    # The root, as errors of neighbouring frames are alike: they are not as good as two witnesses.
+    seen = (p + 1e-6).sqrt()
+    before, after = torch.ones_like(p), torch.ones_like(p)
+    for t in range(1, len(p)):
+        before[t] = spread(before[t - 1] * seen[t - 1])
+        after[-1 - t] = spread(after[-t] * seen[-t])
+    return before * seen * after
+
+
+def read(logits: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+    """Places (T, 2, 2) and sureness (T, 2) in 0..1 of a clip's logits (T, 2, 42 * 42 + 1).
+
+    A place is the mean of the cells about the peak of `together`, the sureness what the frame's own
+    map has there: little, if it has other peaks, or if it says nowhere.
+    """
+    p = logits.float().softmax(2)[..., :-1].unflatten(2, (CELLS, CELLS))  # (T, 2, 42, 42)
+    peak = F.avg_pool2d(together(p), 3, 1, 1).flatten(2).argmax(2)  # (T, 2)
+    cell = torch.arange(CELLS)
+    near_y = (cell - peak[..., None] // CELLS).abs() <= WINDOW  # (T, 2, 42)
     near_x = (cell - peak[..., None] % CELLS).abs() <= WINDOW
-    p = p * near_y[..., :, None] * near_x[..., None, :]
-    sure, at = p.sum((2, 3)), middles().to(p.device)
-    place = torch.stack([p.sum(2) @ at, p.sum(3) @ at], -1)
-    return place / sure[..., None].clamp(min=1e-9), sure
+    p = (p + 1e-12) * near_y[..., :, None] * near_x[..., None, :]
+    sure = p.sum((2, 3))
+    place = torch.stack([p.sum(2) @ middles(), p.sum(3) @ middles()], -1)
+    return place / sure[..., None], sure

@@ -9,8 +9,9 @@ import torch
 
 from lbw_minimal import corners, detector, drawings, video
 from lbw_minimal.detector import Detector, Found, refine
-from lbw_minimal.detector_networks import CELLS, Network, loss, read, target
+from lbw_minimal.detector_networks import CELLS, Network, both_ways, loss, read, target
 from lbw_minimal.drawings import STORIES, Clip, draw_clip
+from lbw_minimal.images import to_images
 from lbw_minimal.training import Checkpoint, InputError
 from tasks import VIDEOS, WEIGHTS, bare
 from tasks.world import load_recordings
@@ -33,29 +34,30 @@ def black(monkeypatch):
 
 
 def off(clip, place):
-    """How far, in pixels, `place` is from what is bright, in frames that show no edge of it."""
+    """How far, in pixels, `place` is from what is bright, far from bars and edges."""
     y, x = np.mgrid[:84, :84] + 0.5
     for frame, at in zip(clip.frames[..., 0].astype(float), place, strict=True):
-        if np.isfinite(at).all() and (np.abs(at - 42) < 34).all() and frame.sum() > 1000:
+        if np.isfinite(at).all() and (np.abs(at - 42) < 16).all():
             near = frame * (np.hypot(x - at[0], y - at[1]) < 6)
             seen = np.array([(x * near).sum(), (y * near).sum()]) / near.sum()
             yield np.linalg.norm(seen - at)
 
 
 def test_a_bright_tip_is_where_the_clip_says(black, monkeypatch):
+    monkeypatch.setattr(drawings, "_object", lambda *_: lambda t: drawings.draw.empty())
     monkeypatch.setattr(
         drawings.draw.Person, "draw", lambda self, tip, *_: disc(drawings.draw.empty(), tip)
     )
-    clips = [draw_clip(np.random.default_rng(i), 6, "reach") for i in range(30)]
+    clips = [draw_clip(np.random.default_rng(i), 6, "reach") for i in range(60)]
     errors = [e for clip in clips for e in off(clip, clip.tip)]
-    assert len(errors) > 60 and max(errors) < 0.2
+    assert len(errors) > 40 and max(errors) < 0.2
 
 
 def test_a_bright_object_is_where_the_clip_says(black, monkeypatch):
     monkeypatch.setattr(drawings.draw, "thing", lambda layer, kind, at, *_: disc(layer, at))
-    clips = [draw_clip(np.random.default_rng(i), 6, "alone") for i in range(30)]
+    clips = [draw_clip(np.random.default_rng(i), 6, "alone") for i in range(60)]
     errors = [e for clip in clips for e in off(clip, clip.object)]
-    assert len(errors) > 60 and max(errors) < 0.2
+    assert len(errors) > 40 and max(errors) < 0.2
 
 
 @pytest.mark.parametrize("kind", STORIES)
@@ -102,6 +104,30 @@ def test_reading_what_is_taught_gives_the_place_back_to_a_twentieth_of_a_pixel()
     assert torch.allclose(place, places, atol=0.05)
     assert (sure > 0.98).all()
     assert read((target(places * np.nan) + 1e-12).log())[1].max() < 0.01
+
+
+def test_a_peak_that_no_neighbouring_frame_has_is_passed_over():
+    """In the middle frame a false peak is twice as likely as the one that moves on."""
+    frames = [target(torch.tensor([[[20.0 + 2 * t, 40.0]] * 2])) for t in range(7)]
+    false = target(torch.tensor([[[70.0, 10.0]] * 2]))
+    frames[3] = frames[3] / 3 + false * 2 / 3
+    place, sure = read((torch.cat(frames) + 1e-12).log())
+    assert torch.allclose(place[3, 0], torch.tensor([26.0, 40.0]), atol=0.2)
+    assert sure[3, 0].item() == pytest.approx(1 / 3, abs=0.02)  # the frame's own map is not sure
+    alone, _ = read((frames[3] + 1e-12).log())
+    assert torch.allclose(alone[0, 0], torch.tensor([70.0, 10.0]), atol=0.2)
+
+
+def test_a_cut_is_followed_at_once():
+    places = torch.tensor([[[20.0, 40.0]] * 2] * 4 + [[[60.0, 30.0]] * 2] * 4)
+    assert torch.allclose(read((target(places) + 1e-12).log())[0], places, atol=0.2)
+
+
+def test_looking_both_ways_mirrors_the_maps_back():
+    frames = np.zeros((1, 84, 84, 12), np.uint8)
+    frames[:, 40:44, 10:14] = 255
+    place, _ = read(both_ways(Bright(), to_images(frames)))
+    assert torch.allclose(place[0, 0], torch.tensor([12.0, 42.0]), atol=0.5)
 
 
 def test_two_equal_peaks_are_not_sure():
