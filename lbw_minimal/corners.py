@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 
 FOLLOWED = 480  # pixels, the longer side of the frames in which corners are followed
+WINDOW = (11, 11)  # pixels, what is compared about a corner
 BACK = 0.5  # pixels: a corner that comes back further off is lost
 # In 84ths of the longer side: how far from the object's middle its corners are, and how much
 # unlike its path theirs may be.
@@ -34,9 +35,11 @@ def follow(grey: np.ndarray) -> np.ndarray:
     for one, two in pairwise(grey):
         path = np.full_like(paths[0], np.nan)
         if len(alive):
-            there, ok, _ = cv2.calcOpticalFlowPyrLK(one, two, here, None, winSize=(11, 11))
-            back, ok_back, _ = cv2.calcOpticalFlowPyrLK(two, one, there, None, winSize=(11, 11))
-            kept = (ok & ok_back)[:, 0].astype(bool)
+            there, ok, _ = cv2.calcOpticalFlowPyrLK(one, two, here, here.copy(), winSize=WINDOW)
+            back, ok_back, _ = cv2.calcOpticalFlowPyrLK(
+                two, one, there, there.copy(), winSize=WINDOW
+            )
+            kept = (np.hstack([ok, ok_back]) > 0).all(1)
             kept &= np.linalg.norm(back - here, axis=2)[:, 0] < BACK
             alive, here = alive[kept], there[kept]
             path[alive] = here[:, 0]

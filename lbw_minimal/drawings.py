@@ -298,7 +298,8 @@ def _camera(rng, pictures, masks, places):
         places = np.roll(places, cut, 1)
     half = (SIZE // 2, SIZE // 2)
     masks = np.stack([cv2.resize(mask, half, interpolation=cv2.INTER_AREA) for mask in masks])
-    return Clip(np.ascontiguousarray(frames), *places.astype(np.float32), masks)
+    tip, object_ = places.astype(np.float32)
+    return Clip(np.ascontiguousarray(frames), tip, object_, masks)
 
 
 def _developed(rng, frames):

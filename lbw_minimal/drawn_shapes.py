@@ -70,7 +70,7 @@ def a_surface(rng: np.random.Generator, strength: float) -> np.ndarray:
         y, x = np.mgrid[:SIZE, :SIZE]
         a, step = rng.uniform(0, np.pi), rng.uniform(1.5, 15)
         pattern += np.sign(np.sin((x * np.cos(a) + y * np.sin(a)) * 2 * np.pi / step))
-    return np.float32(1 + strength * pattern[..., None])
+    return (1 + strength * pattern[..., None]).astype(np.float32)
 
 
 # Layers and shapes
