@@ -63,6 +63,7 @@ def main(argv: list[str]) -> None:
         make_folder(args.out)
         metrics = learn(args.iterations, args.seed, weights)
         model = Detector.load(weights)  # what is measured is what is shipped: half precision
+    write_atomic(metrics_file, json.dumps(metrics, indent=1) + "\n")  # measuring takes minutes
     metrics.setdefault("error", {}).update(measure(model, args.clips))
     write_atomic(metrics_file, json.dumps(metrics, indent=1) + "\n")
     for where, figures in metrics["error"].items():
