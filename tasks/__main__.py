@@ -43,7 +43,7 @@ def main(argv: list[str] | None = None) -> int:
         elif name in tasks.TASKS:
             import_module("tasks.commands.run").main(name, rest)
         elif name in COMMANDS:
-            import_module(f"tasks.commands.{name}").main(rest)
+            return import_module(f"tasks.commands.{name}").main(rest) or 0
         else:
             there = ", ".join((*tasks.TASKS, *COMMANDS))
             raise InputError(f"{name}: there is no such task or command; choose one of {there}.")

@@ -38,6 +38,7 @@ class Coffee(TaskEnv):
     WORKSPACE = ((0.42, -0.01, 0.015), (0.66, 0.01, 0.22))
     START = (0.45, 0.0, 0.16)
     CONTACT = RADIUS + FINGER
+    PUSH_AT = 0.03
 
     def furnish(self) -> None:
         head = OUTLET + 0.015  # the hand fits in front of it
@@ -113,9 +114,9 @@ class Coffee(TaskEnv):
 
     def waypoints(self) -> list[Leg]:
         behind = self.object_position()[0] - self.CONTACT - 0.025
-        end = np.array([OUTLET - self.CONTACT, 0, 0.03])
+        end = np.array([OUTLET - self.CONTACT, 0, self.PUSH_AT])
         return [
-            Leg(np.array([behind, 0, 0.03]), 1.0),
+            Leg(np.array([behind, 0, self.PUSH_AT]), 1.0),
             Leg(end, 1.4),
             Leg(end, 0.2),  # the tip lags its goal by 2 / 20 s
         ]

@@ -42,6 +42,7 @@ class Drawer(TaskEnv):
     WORKSPACE = ((0.42, -0.01, 0.03), (0.70, 0.01, 0.22))
     START = (0.45, 0.0, 0.17)
     CONTACT = FINGER
+    PUSH_AT = HEIGHT
 
     def furnish(self) -> None:
         depth, width, height = CABINET

@@ -49,9 +49,9 @@ class Push(TaskEnv):
 
     def waypoints(self) -> list[Leg]:
         behind = self.object_position()[0] - self.CONTACT - 0.025
-        end = np.array([TARGET - self.CONTACT, 0, 0.02])
+        end = np.array([TARGET - self.CONTACT, 0, self.PUSH_AT])
         return [
-            Leg(np.array([behind, 0, 0.02]), 0.6),
+            Leg(np.array([behind, 0, self.PUSH_AT]), 0.6),
             Leg(end, 0.8),
             Leg(end, 0.2),  # the tip lags its goal by 2 / 20 s
         ]

@@ -68,7 +68,7 @@ class Slide(TaskEnv):
         return self.distance() < SUCCESS and bool(speed < AT_REST)
 
     def waypoints(self) -> list[Leg]:
-        behind = self.object_position() * (1, 1, 0) + (-self.CONTACT - 0.04, 0, 0.02)
+        behind = self.object_position() * (1, 1, 0) + (-self.CONTACT - 0.04, 0, self.PUSH_AT)
         end = behind + (STROKE, 0, 0)
         return [
             Leg(behind, 0.6),

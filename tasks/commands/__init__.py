@@ -17,6 +17,7 @@ from lbw_minimal.training import InputError
 from tasks.world.env import MOST_JITTER
 
 COMMANDS = {  # each a file in this folder
+    "prepare": "a clip of your own arm made into a human video, with a page that says how",
     "record": "film the human videos of a task again",
     "stage": "a page to film your own arm with",
     "export": "the experts' actions, states and frames as a Minari dataset",

@@ -24,10 +24,21 @@ from lbw_minimal.imitate import Perception, Recipe, Run, load_perception
 from lbw_minimal.reward import MENDS
 from lbw_minimal.training import InputError, pick_device, write_atomic
 from tasks.commands import JITTER, Parser, at_least, make_folder, metres
+from tasks.commands.prepare import FILM, PAGE, usable
+from tasks.commands.prepare import write as write_clip
 from tasks.commands.record import EXPERTS
 
 TEST_EPISODES = 10  # as in the paper
-RESULTS = ("*.checkpoint", "*.frames", "*.safetensors", "*_log.json", "metrics.json", "report.html")
+RESULTS = (
+    "*.checkpoint",
+    "*.frames",
+    "*.safetensors",
+    "*_log.json",
+    "metrics.json",
+    "report.html",
+    FILM,
+    PAGE,
+)
 FAST = {
     "munit_iterations": 10,
     "munit_width": 8,
@@ -58,7 +69,12 @@ def parser(name: str) -> Parser:
         default="lbw",
         help="avid, classifier: the paper's rivals",
     )
-    add("--video", type=Path, metavar="FILE", help="another human video, as the whole human domain")
+    add("--video", type=Path, metavar="FILE", help="a clip of your own arm; see prepare")
+    add(
+        "--translate-clip",
+        action="store_true",
+        help="translation trained on that clip alone, as the paper has it, and no re-enactment",
+    )
     add("--videos", type=at_least(1), metavar="N", help="human videos (lbw 1, avid 15)")
     add("--from-scratch", action="store_true", help="train perception too")
     add("--reward", choices=("mended", "literal"), default="mended", help="literal: Eq. 8-10")
@@ -86,7 +102,7 @@ class Job:
     recipe: Recipe
     from_scratch: bool
     experts: list[np.ndarray]  # human videos of the task, (N, 84, 84, 3) uint8 each
-    random: np.ndarray  # other human motion, same type; empty with the user's own video
+    random: np.ndarray  # other human motion, same type; empty where a clip alone is translated
     trained: Perception | None  # None if perception is to be learnt
     weights: Path  # folder of trained weights
     command: str  # what makes this run again
@@ -101,7 +117,7 @@ class Job:
 def check(name: str, args: argparse.Namespace, argv: list[str]) -> Job:
     """Look at everything the user gave before anything is written."""
     lbw = args.method == "lbw"
-    from_scratch = lbw and (args.from_scratch or args.fast or args.video is not None)
+    from_scratch = lbw and (args.from_scratch or args.fast or args.translate_clip)
     refuse_idle_options(args, from_scratch)
     module = tasks.module(name)
     fast = FAST if lbw else FAST | FAST_PIXELS
@@ -110,9 +126,11 @@ def check(name: str, args: argparse.Namespace, argv: list[str]) -> Job:
     pick_device(args.device or "cpu")
     torch.set_num_threads(args.threads or os.cpu_count() or 1)
 
-    experts = [read_video(path) for path in videos(name, args)]
-    waving = tasks.VIDEOS / name / "random.mp4"
-    random = experts[0][:0] if args.video else read_video(waving, whole=True)
+    clip = usable(name, args.video) if args.video and not args.translate_clip else None
+    experts = [clip.film] if clip else [read_video(path) for path in videos(name, args)]
+    random = experts[0][:0]
+    if not args.translate_clip:
+        random = read_video(tasks.VIDEOS / name / "random.mp4", whole=True)
     if lbw:  # whose demonstration is one: the translation sees the others beside random motion
         random = np.concatenate([random, *experts[1:]])
     weights, out = args.weights or tasks.WEIGHTS / name, args.out or Path("runs") / name
@@ -144,6 +162,13 @@ def check(name: str, args: argparse.Namespace, argv: list[str]) -> Job:
     run.metrics["version"] = __version__
     machine = f"{platform.machine()}, {os.cpu_count()} cores, torch {torch.__version__}"
     run.metrics["machine"] = machine
+    if clip:
+        write_clip(
+            run.out,
+            name,
+            clip,
+            shlex.join(["python", "-m", "tasks", "prepare", name, str(args.video)]),
+        )
     return Job(name, args, recipe, from_scratch, experts, random, perception, weights, command, run)
 
 
@@ -197,6 +222,8 @@ def refuse_idle_options(args: argparse.Namespace, from_scratch: bool) -> None:
         idle += [("--videos", args.videos, "the classifier reward films the robot itself")]
     if args.video:
         idle += [("--videos", args.videos, "--video gives the only one")]
+    else:
+        idle += [("--translate-clip", args.translate_clip, "--video names the clip")]
     if args.method != "lbw":
         why = f"--method {args.method} has no keypoints and learns its reward anew"
         idle += [("--from-scratch", args.from_scratch, why), ("--without", args.without, why),

@@ -61,7 +61,7 @@ def perceive(job: Job) -> tuple[Perception, np.ndarray]:
             task=job.name, seed=seed, run=job.run, device=job.args.device or "cpu",
         )  # fmt: skip
     # The probe films the simulated human, whom a perception trained on another video never saw.
-    if job.from_scratch and job.args.video is None and "perception" not in job.run.metrics:
+    if job.from_scratch and not job.args.translate_clip and "perception" not in job.run.metrics:
         perception.watch(job.demo)
         found = probe(job.name, perception, PROBE_SEED + seed)
         job.run.metrics["perception"] = found

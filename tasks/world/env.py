@@ -13,6 +13,7 @@ import numpy as np
 from gymnasium.error import ClosedEnvironmentError, InvalidAction, ResetNeeded, UnsupportedMode
 from gymnasium.utils import EzPickle
 
+from lbw_minimal.retarget import Scene
 from tasks.world.arm import KP, Arm
 from tasks.world.scene import FINGER, LOOKS, SIZE, SUBSTEPS, World
 
@@ -62,6 +63,7 @@ class TaskEnv(gym.Env, EzPickle):
     START = (0.46, 0.0, 0.12)  # m, the tip at reset
     # m along x from tip to object when they touch; None where nothing is touched.
     CONTACT: float | None = None
+    PUSH_AT = 0.02  # m, the tip's height while it pushes
 
     def __init__(
         self,
@@ -248,6 +250,23 @@ class TaskEnv(gym.Env, EzPickle):
     def distance(self) -> float:
         """From the object to where it has to get, in m."""
         return float(np.linalg.norm(self.object_position() - self.target_position()))
+
+    def scene(self) -> Scene:
+        """The scene in its plane, for a person's clip to be laid into; as it is after a reset."""
+
+        def plane(point):
+            return float(point[0]), float(point[2])
+
+        return Scene(
+            start=plane(self.object_position()),
+            goal=plane(self.target_position()),
+            tip=plane(self.START),
+            low=plane(self.WORKSPACE[0]),
+            high=plane(self.WORKSPACE[1]),
+            step=self.STEP,
+            contact=self.CONTACT,
+            height=self.PUSH_AT,
+        )
 
     def true_state(self) -> np.ndarray:
         """Tip, object and target in metres, (9,) float32; for lessons, recordings and tests."""

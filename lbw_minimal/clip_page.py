@@ -1,0 +1,238 @@
+"""The page about a person's clip: what was found in it, what was done, and what came of it.
+
+In: the clip, the tracks found in it, their motion in the scene, the film of its re-enactment and
+what the shipped networks see in that. Out: one HTML file that needs no other file and no network. A
+click into one of its frames writes the option that corrects what was found there.
+"""
+
+from __future__ import annotations
+
+import json
+from html import escape
+from pathlib import Path
+
+import cv2
+import numpy as np
+from matplotlib import rc_context
+from matplotlib.figure import Figure
+
+from lbw_minimal.paths import SURE, Tracks
+from lbw_minimal.pictures import (
+    COLOURS,
+    STYLE,
+    data_uri,
+    draw_keypoints,
+    enlarge,
+    film,
+    picture,
+    spread,
+    svg,
+)
+from lbw_minimal.report import section, table
+from lbw_minimal.report_texts import CSS, HTML
+from lbw_minimal.retarget import FPS, Motion, Scene
+from lbw_minimal.training import write_atomic
+
+SCALE = 3  # of the film's pictures, 84 pixels wide
+WIDE = 360  # pixels, the longer side of a frame of the clip
+FRAMES = 12  # of the clip that the page shows
+TIP, OBJECT = (213, 94, 0), (86, 180, 233)  # Okabe and Ito's vermilion and sky blue
+STRIP = """
+.clip { display: grid; grid-template-columns: repeat(auto-fill, minmax(11rem, 1fr)); gap: .6rem }
+.clip figure { margin: 0 }
+.clip img { width: 100%; cursor: crosshair }
+"""
+CLICK = """
+<p>Vermilion is the tip of the hand, sky blue the object; a hollow ring was not sure. Is one of them
+wrong? Click where it should be, in that frame, and run the command below. Two or three frames are
+enough: between them the correction is interpolated.</p>
+<p><label><input type="radio" name="what" value="tip" checked> tip</label>
+<label><input type="radio" name="what" value="object"> object</label></p>
+"""
+SCRIPT = """
+<pre id="command"></pre>
+<script>
+const base = %s, marks = [];
+const pre = document.getElementById("command");
+pre.textContent = base;
+document.querySelectorAll(".clip img").forEach(img => img.addEventListener("click", e => {
+  const what = document.querySelector("[name=what]:checked").value;
+  const box = img.getBoundingClientRect();
+  const x = (e.clientX - box.left) / box.width * img.dataset.width;
+  const y = (e.clientY - box.top) / box.height * img.dataset.height;
+  marks.push(`--${what} ${x.toFixed(0)},${y.toFixed(0)}@${img.dataset.time}`);
+  pre.textContent = [base, ...marks].join(" ");
+}));
+</script>
+"""
+OPTIONS = [
+    ("--from S, --to S", "use only what is between these seconds of the clip"),
+    ("--mirror, --no-mirror", "turn left into right, or do not"),
+    ("--tip X,Y@S", "the tip of the hand is at these pixels at that second"),
+    ("--object X,Y@S", "and the object at these"),
+]
+SCENE = """
+<p>The clip's motion in the task's scene, in centimetres, as the simulated human was asked to do it
+(dashed) and did it (solid). Contact and arrival are the two grey lines. Before the clip's hand
+comes into reach, the arm comes from its own start.</p>
+"""
+SIDE_BY_SIDE = """
+<p>From left to right: the clip; the same motion, done by the simulated human in front of the kit's
+own camera; its translation into the robot's world; and the keypoints found there, which the robot
+will follow. At half speed.</p>
+"""
+
+
+def write_page(
+    path: Path | str,
+    *,
+    task: str,
+    command: str,
+    verdict: str,
+    frames: np.ndarray,
+    times: np.ndarray,
+    scene: Scene,
+    notes: list[str],
+    warnings: list[str],
+    tracks: Tracks | None = None,
+    motion: Motion | None = None,
+    states: np.ndarray | None = None,
+    columns: tuple[np.ndarray, ...] = (),
+    shown: np.ndarray | None = None,
+) -> None:
+    """Write the page, whole or not at all; what is None was not reached and is left out.
+
+    command: what made it; verdict: the sentence on top. frames (T, H, W, 3) uint8, times (T,) s:
+    the clip. states (N, 9) m: tip, object and target of the re-enactment. shown (n,): the steps of
+    the motion in the film; columns: its re-enactment and translation (n, 84, 84, 3) uint8 and
+    keypoints (n, K, 2).
+    """
+    head, _, rest = verdict.partition(": ")
+    page = [f"<h1>{escape(task).capitalize()}: {escape(head)}</h1>", f"<p>{escape(rest)}</p>"]
+    page += [f'<p class="note">{escape(warning)}</p>' for warning in warnings]
+    if columns and shown is not None:
+        seen = _clip_column(frames, times, tracks, motion, shown)
+        shot = data_uri("image/webp", film(_side_by_side(seen, *columns), _rate(shown) / 2))
+        page += section("Clip, re-enactment, translation, keypoints", SIDE_BY_SIDE,
+                        picture(shot, "Film of the clip and what became of it"))  # fmt: skip
+    if tracks is not None:
+        page += section("What was found in the clip", CLICK, clip_frames(frames, times, tracks),
+                        SCRIPT % json.dumps(command).replace("<", "\\u003c"))  # fmt: skip
+        page.append(picture(svg(confidence(tracks)), "How sure tip and object were found"))
+    if notes:
+        page += section(
+            "What was done", f"<ul>{''.join(f'<li>{escape(n)}</li>' for n in notes)}</ul>"
+        )
+    if motion is not None:
+        figure = courses(motion, scene, states)
+        page += section("The motion in the scene", SCENE, picture(svg(figure), "Paths over time"))
+    again = f"<pre>{escape(command)}</pre>" if tracks is None else ""
+    page += section("To decide otherwise", table(OPTIONS), again)
+    title = f"{escape(task)}: a clip of one's own"
+    write_atomic(path, HTML.format(title=title, css=CSS + STRIP, body="".join(page)))
+
+
+def clip_frames(frames: np.ndarray, times: np.ndarray, tracks: Tracks) -> str:
+    """Frames of the clip with tip and object drawn on them, which know where they are clicked."""
+    figures = []
+    for i in spread(len(tracks.times), FRAMES):
+        t = tracks.times[i]
+        frame = frames[int(np.abs(times - t).argmin())]
+        image = cv2.imencode(".webp", _drawn(frame, tracks, i)[..., ::-1])[1].tobytes()
+        size = f'data-width="{frame.shape[1]}" data-height="{frame.shape[0]}"'
+        caption = f"{t:.2f} s; sure: {tracks.tip_sure[i]:.0%}, {tracks.object_sure[i]:.0%}"
+        figures.append(
+            f'<figure><img alt="Frame at {t:.2f} s" data-time="{t:.3f}" {size} '
+            f'src="{data_uri("image/webp", image)}"><figcaption>{caption}</figcaption></figure>'
+        )
+    return f'<div class="clip">{"".join(figures)}</div>'
+
+
+def _drawn(frame, tracks=None, i=0):
+    """A frame at most WIDE pixels wide or high, with what was found at index i of the tracks."""
+    scale = WIDE / max(frame.shape[:2])
+    how = cv2.INTER_AREA if scale < 1 else cv2.INTER_CUBIC
+    small = cv2.resize(frame, None, fx=scale, fy=scale, interpolation=how)
+    if tracks is not None:
+        for name, paint in (("object", OBJECT), ("tip", TIP)):
+            x, y = (scale * getattr(tracks, name)[i]).tolist()
+            sure = getattr(tracks, f"{name}_sure")[i] >= SURE
+            at = round(16 * x), round(16 * y)
+            for radius, ink, wide in ((7, (255, 255, 255), -1), (5, paint, -1)):
+                cv2.circle(small, at, 16 * radius, ink, wide if sure else 2, cv2.LINE_AA, shift=4)
+    return small
+
+
+def _clip_column(frames, times, tracks, motion, shown):
+    """The clip's frames (n, S, S, 3) that belong to the steps of the motion, in black bars."""
+    out, S = [], 84 * SCALE
+    for k in shown:
+        t = times[0] + k / FPS
+        if motion is not None:  # after its end, as after a hit, the clip goes on
+            t = motion.times[min(k, len(motion.times) - 1)]
+            t += max(0, k + 1 - len(motion.times)) / FPS
+        frame = frames[int(np.abs(times - t).argmin())]
+        small = _drawn(
+            frame, tracks, 0 if tracks is None else int(np.abs(tracks.times - t).argmin())
+        )
+        if motion is not None and motion.mirrored:
+            small = small[:, ::-1]
+        scale = S / max(small.shape[:2])
+        small = cv2.resize(small, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)[:S, :S]
+        square = np.zeros((S, S, 3), np.uint8)
+        top, left = (S - small.shape[0]) // 2, (S - small.shape[1]) // 2
+        square[top : top + small.shape[0], left : left + small.shape[1]] = small
+        out.append(square)
+    return np.stack(out)
+
+
+def _side_by_side(seen, done, translated, z):
+    parts = (
+        seen,
+        *(enlarge(x, SCALE) for x in (done, translated)),
+        draw_keypoints(translated, z, SCALE),
+    )
+    return np.concatenate(parts, axis=2)
+
+
+def _rate(shown):
+    return FPS / max(1.0, float(np.mean(np.diff(shown)))) if len(shown) > 1 else FPS
+
+
+def confidence(tracks: Tracks) -> Figure:
+    """How sure tip and object were found in every frame."""
+    with rc_context(STYLE):
+        figure = Figure(figsize=(7, 2.2))
+        axis = figure.subplots()
+        axis.plot(tracks.times, tracks.tip_sure, ".-", color=COLOURS[4], label="tip")
+        axis.plot(tracks.times, tracks.object_sure, ".-", color=COLOURS[5], label="object")
+        axis.axhline(SURE, color="grey", lw=1, ls=":")
+        for cut in tracks.cuts:
+            axis.axvline(tracks.times[cut], color="black", lw=1)
+        axis.set(xlabel="time in the clip (s)", ylabel="sure", ylim=(0, 1.05))
+        axis.legend(loc="lower right", ncols=2)
+    return figure
+
+
+def courses(motion: Motion, scene: Scene, states: np.ndarray | None) -> Figure:
+    """Tip and object in the scene over time, asked for (dashed) and done (solid), in cm."""
+    with rc_context(STYLE):
+        figure = Figure(figsize=(7, 4.4))
+        above, below = figure.subplots(2, sharex=True)
+        for axis, k, name in ((above, 0, "along the table"), (below, 1, "above the table")):
+            t = np.arange(len(motion.tip)) / FPS
+            axis.plot(t, 100 * motion.tip[:, k], "--", color=COLOURS[4], lw=1.5)
+            if motion.object is not None:
+                axis.plot(t, 100 * motion.object[:, k], "--", color=COLOURS[5], lw=1.5)
+            if states is not None:
+                t = np.arange(len(states)) / FPS
+                axis.plot(t, 100 * states[:, 2 * k], color=COLOURS[4], lw=2, label="tip")
+                if motion.object is not None:
+                    axis.plot(t, 100 * states[:, 3 + 2 * k], color=COLOURS[5], lw=2, label="object")
+            axis.axhline(100 * scene.goal[k], color=COLOURS[2], lw=1, label="goal")
+            for step in (motion.contact, motion.arrival):
+                axis.axvline(step / FPS, color="grey", lw=1)
+            axis.set(ylabel=f"{name} (cm)")
+        below.set_xlabel("time in the re-enactment (s)")
+        above.legend(loc="upper left", ncols=3)
+    return figure

@@ -1,0 +1,67 @@
+"""Whether a clip is footage of one arm in front of a camera that stands still.
+
+In: frames (T, H, W, 3) uint8 of any size. Nothing is found here, only what spoils a search: a clip
+in which nothing moves, or the camera does, or a second person. The measures are those of
+`video.py`, taken on small pictures.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import cv2
+import numpy as np
+
+from lbw_minimal.paths import Unusable
+from lbw_minimal.video import LOOK_AT, MOVED, MOVED_SHARE, SIZE, STEADY, high_pass, steadiness
+
+SHAKEN = 0.80  # steadiness of a drawn room that is panned by 10 of 84 pixels; STEADY is a warning
+LARGE = 0.03  # of the picture: what moves and is smaller is no person's arm
+DEEP = 0.15  # of the picture's width: so far does an arm come in from the edge
+BOTH = 0.2  # of the frames: so often there have to be arms from both sides
+
+
+def check(frames: np.ndarray, cuts: tuple[int, ...] = ()) -> list[str]:
+    """Warnings about the frames; cuts: frames with which a new shot begins.
+
+    Raises Unusable if nothing moves, if the camera moves, or if arms come in from both sides.
+    """
+    edges = [0, *cuts, len(frames)]
+    first, last = max(pairwise(edges), key=lambda shot: shot[1] - shot[0])
+    pick = first + np.linspace(0, last - first - 1, min(last - first, LOOK_AT)).astype(int)
+    small = np.stack([_small(frames[i]) for i in pick])
+    still = high_pass(small)
+    background = np.median(still, axis=0)  # (84, 84)
+    moves = np.abs(still - background) > MOVED  # (T, 84, 84)
+    if moves.mean(axis=(1, 2)).max() < MOVED_SHARE:
+        raise Unusable("nothing moves in the clip", "film an arm that does the task")
+    steady = steadiness(still, background)
+    if steady < SHAKEN:
+        raise Unusable(
+            "the camera moves", "put it on a stand or lean it against something, and film again"
+        )
+    if np.mean([_from_both_sides(frame) for frame in moves]) > BOTH:
+        raise Unusable(
+            "arms come in from the left and from the right, as of several people",
+            "film one arm, and let nothing else move near the edges",
+        )
+    if steady < STEADY:
+        return ["The camera seems to move a little; a stand would help."]
+    return []
+
+
+def _small(frame):
+    return cv2.resize(frame, (SIZE, SIZE), interpolation=cv2.INTER_AREA)
+
+
+def _from_both_sides(moves):
+    """Whether two separate things that move (84, 84) come in from the left and the right edge."""
+    closed = cv2.morphologyEx(moves.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((7, 7), np.uint8))
+    _, _, stats, _ = cv2.connectedComponentsWithStats(closed)
+    left = right = False
+    for x, _, width, _, area in stats[1:]:
+        if area >= LARGE * moves.size and width >= DEEP * SIZE:
+            at_left, at_right = x <= 1, x + width >= SIZE - 1
+            left |= bool(at_left and not at_right)
+            right |= bool(at_right and not at_left)
+    return left and right

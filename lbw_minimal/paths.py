@@ -1,0 +1,189 @@
+"""The paths of tip and object that were found in a clip, cleaned: the best shot, without noise.
+
+In: pixels with time stamps, as they were found, at any frame rate. Out: paths in the best shot of
+the clip, at any times one asks for. Nothing of this is in the paper.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lbw_minimal.training import InputError
+
+SMOOTH = 0.05  # s, sigma of the low-pass; a webcam's frames are 0.1 s apart, a phone's 0.03
+REST = 0.3  # s that are kept of a rest before the hand starts and after the object has arrived
+SURE = 0.3  # a point found with less is as good as not found
+FOUND = 0.5  # share of the frames in which a point has to be found
+LEAST_FRAMES = 8  # of a piece: 0.3 s of a phone's, 0.8 s of a slow webcam's
+LEAST_WAY = 0.04  # of the picture's shorter side: a detector errs by 0.01
+JUMP = 0.04  # of the same, from one frame to the next, where the picture changes at once as well
+RESTS = 0.05  # of the fastest speed; what is slower rests
+
+
+class Unusable(InputError):
+    """A clip that cannot be laid into the scene: why, and what to film otherwise."""
+
+    def __init__(self, reason: str, remedy: str):
+        super().__init__(f"{reason}; {remedy}.")
+
+
+@dataclass(frozen=True)
+class Tracks:
+    """What was found in a clip of T frames: pixels (x right, y down), and how sure (0 to 1)."""
+
+    times: np.ndarray  # (T,) s
+    tip: np.ndarray  # (T, 2)
+    object: np.ndarray  # (T, 2)
+    tip_sure: np.ndarray  # (T,)
+    object_sure: np.ndarray  # (T,)
+    side: int  # pixels, the shorter side of the frames
+    cuts: tuple[int, ...] = ()  # frames at which the picture changes all at once
+
+    def part(self, first: int, last: int) -> Tracks:
+        """Frames `first` to `last` - 1."""
+        names = ("times", "tip", "object", "tip_sure", "object_sure")
+        inside = tuple(c - first for c in self.cuts if first < c < last)
+        return replace(self, cuts=inside, **{n: getattr(self, n)[first:last] for n in names})
+
+    def marked(self, name: str, marks: list[tuple[float, float, float]]) -> Tracks:
+        """The path `name`, "tip" or "object", moved so that it passes through marks (x, y, s).
+
+        Between two marks the correction is interpolated, and before and after them it stays. Where
+        nothing is sure, the marks alone make the path. All of it counts as sure then.
+        """
+        if not marks:
+            return self
+        x, y, s = np.array(sorted(marks, key=lambda mark: mark[2])).T
+        sure = getattr(self, f"{name}_sure") >= SURE
+        path = np.zeros((len(self.times), 2))
+        if sure.any():
+            path = interpolate(self.times[sure], getattr(self, name)[sure], self.times)
+        off = np.stack([x, y], 1) - interpolate(self.times, path, s)
+        path = path + interpolate(s, off, self.times)
+        return replace(self, **{name: path, f"{name}_sure": np.ones(len(path))})
+
+
+def longest_piece(tracks: Tracks, touched: bool, notes: list[str]) -> Tracks:
+    """The piece between cuts in which most happens, from where the hand is first to last seen.
+
+    A cut is a frame at which the picture changes all at once, and tip or object jump. Most happens
+    where the object goes farthest, or the tip where nothing is touched.
+    """
+    cuts = [c for c in tracks.cuts if _jumps(tracks, c)]
+    pieces = []
+    for first, last in zip([0, *cuts], [*cuts, len(tracks.times)], strict=True):
+        seen = first + np.flatnonzero(tracks.tip_sure[first:last] >= SURE)
+        if len(seen) and seen[-1] + 1 - seen[0] >= LEAST_FRAMES:
+            pieces.append(tracks.part(seen[0], seen[-1] + 1))
+    if not pieces:
+        if (tracks.tip_sure >= SURE).mean() < FOUND:
+            raise _no_arm(tracks)
+        raise Unusable(
+            f"{len(tracks.times)} frames are too few, even without cuts {LEAST_FRAMES} are needed",
+            "film the whole motion in one go, at 10 frames a second or more",
+        )
+    best = max(pieces, key=lambda piece: _extent(piece, "object" if touched else "tip"))
+    if cuts:
+        at = f"{best.times[0]:.1f} s to {best.times[-1]:.1f} s"
+        notes.append(f"The film is cut {len(cuts)} times; the piece from {at} was taken.")
+    return best
+
+
+def _jumps(tracks, c):
+    """Whether tip or object jump at frame c, farther than they move just before and after."""
+    for name in ("tip", "object"):
+        path, sure = getattr(tracks, name), getattr(tracks, f"{name}_sure")
+        around = path[max(0, c - 2) : c + 2]
+        steps = np.linalg.norm(np.diff(around, axis=0), axis=1)
+        if name == "tip" and (sure[c - 1 : c + 1] < SURE).any():
+            return True
+        here = np.linalg.norm(path[c] - path[c - 1])
+        if here > JUMP * tracks.side and here > 2 * np.median(steps):
+            return True
+    return False
+
+
+def _extent(tracks, name):
+    points = getattr(tracks, name)[getattr(tracks, f"{name}_sure") >= SURE]
+    return np.linalg.norm(np.ptp(median3(points), axis=0)) if len(points) else 0.0
+
+
+def _no_arm(tracks):
+    share = (tracks.tip_sure >= SURE).mean()
+    return Unusable(
+        f"no arm is seen in most of the clip, a hand's tip in {share:.0%} of it",
+        "film from the side, so that arm and hand come in from the left or right edge, uncovered",
+    )
+
+
+def trusted(tracks: Tracks, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Times and points (n, 2) of the frames in which the tip or the object is surely found."""
+    sure = getattr(tracks, f"{name}_sure") >= SURE
+    if sure.mean() < FOUND and name == "tip":
+        raise _no_arm(tracks)
+    if sure.mean() < FOUND:
+        raise Unusable(
+            f"the object is seen in {sure.mean():.0%} of the frames, and hidden or too small else",
+            "push it from behind, with the hand between it and the edge of the picture, and film "
+            "an object as large as a fist",
+        )
+    return tracks.times[sure], median3(getattr(tracks, name)[sure])
+
+
+def median3(points: np.ndarray) -> np.ndarray:
+    """Points (n, 2) without single glitches: each the median of itself and its neighbours."""
+    if len(points) < 3:
+        return points
+    middle = np.median([points[:-2], points[1:-1], points[2:]], axis=0)
+    return np.concatenate([points[:1], middle, points[-1:]])
+
+
+def interpolate(s: np.ndarray, points: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """Points (n, 2) at the times s, taken at the times t; before and after they stay."""
+    return np.stack([np.interp(t, s, points[:, axis]) for axis in (0, 1)], axis=1)
+
+
+def low_pass(s: np.ndarray, points: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """Points (n, 2) at any times s, smoothed and taken at the times t: (len(t), 2).
+
+    Around each t a straight line is fitted, weighted by a Gaussian of `SMOOTH` seconds. Unlike a
+    mean it does not shorten the ends of a path. What lies between two frames is interpolated first,
+    so a frame counts for as long as it is shown.
+    """
+    fine = float(min(0.2 * SMOOTH, np.median(np.diff(s))))  # s
+    k = np.arange(-round(3 * SMOOTH / fine), round(3 * SMOOTH / fine) + 1)
+    at = t[:, None] + fine * k  # (N, k) s
+    inside = (at >= s[0]) & (at <= s[-1])
+    inside |= ~inside.any(1, keepdims=True)  # t itself is outside: the end stays
+    w, d = inside * np.exp(-0.5 * (fine * k / SMOOTH) ** 2), fine * k
+    w /= w.sum(1, keepdims=True)
+    mean = (w * d).sum(1, keepdims=True)
+    spread = (w * (d - mean) ** 2).sum(1, keepdims=True)
+    w *= 1 - (d - mean) * mean / np.maximum(spread, 1e-12)  # the line's value at d = 0
+    there = interpolate(s, points, at.reshape(-1)).reshape(*at.shape, 2)
+    return (w[..., None] * there).sum(1)
+
+
+def ends(path: np.ndarray, least: float, what: str) -> tuple[np.ndarray, np.ndarray]:
+    """Where a path (N, 2) of pixels begins, and the point of it that is farthest from there.
+
+    Raises Unusable if that is less than `least` pixels away.
+    """
+    away = np.linalg.norm(path - path[0], axis=1)
+    far = int(np.argmax(away))
+    if away[far] < least:
+        raise Unusable(
+            f"the {what} never moves, or by {away[far]:.0f} pixels only",
+            "film the task being done, so near that it goes across a quarter of the picture",
+        )
+    moving = int(np.argmax(away > 2 * RESTS * away[far]))
+    there = np.abs(away - away[far]) < RESTS * away[far]
+    return np.median(path[:moving], axis=0), np.median(path[there], axis=0)
+
+
+def progress(path: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """How much of its way from start to end a path (N, 2) has gone, 0 to 1, and never back."""
+    way = end - start
+    return np.maximum.accumulate(np.clip((path - start) @ way / (way @ way), 0, 1))

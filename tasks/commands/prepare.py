@@ -1,0 +1,294 @@
+"""A person's clip made into a human video of a task, and a page that says what was done.
+
+In: any video file of an arm that does the task. Out: a verdict, `prepare.html`, and, if the clip is
+usable, `reenactment.mp4`, which `python -m tasks TASK --video` takes: the clip's motion, done by
+the simulated human in front of the kit's own camera.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import shlex
+import sys
+import tempfile
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+import tasks
+from lbw_minimal import footage, imitate, video
+from lbw_minimal.clip import Clip, read_clip
+from lbw_minimal.clip_page import write_page
+from lbw_minimal.detector import Detector, Found, refine
+from lbw_minimal.paths import Tracks, Unusable
+from lbw_minimal.pictures import spread
+from lbw_minimal.retarget import FPS, Motion, Scene, lay
+from lbw_minimal.training import InputError, write_atomic
+from tasks.commands import Parser, make_folder
+from tasks.world.reenact import Reenactment, reenact
+
+FILM, PAGE = "reenactment.mp4", "prepare.html"
+SHOWN = 60  # frames of the page's film, which are translated as well: 4 s of work on one core
+OWN = 12  # grey levels: the kit's own films begin with the scene's picture to within 6 of 256
+OWN_STEP = 0.05  # s between frames: a film that is slower has to be interpolated, as a motion
+EYES = tasks.WEIGHTS / "eyes.safetensors"  # the detector of tip and object
+WHERE = "pixels from the left and the upper edge, and seconds; may be given several times"
+
+Mark = tuple[float, float, float]  # x, y in pixels of the clip, s
+
+
+def no_frames() -> np.ndarray:
+    """A film (0, 84, 84, 3) of no frames."""
+    return np.zeros((0, video.SIZE, video.SIZE, 3), np.uint8)
+
+
+@dataclass(frozen=True)
+class Choices:
+    """What the user decides instead of the clip."""
+
+    first: float = 0.0  # s
+    last: float = math.inf  # s
+    mirror: bool | None = None
+    tip: tuple[Mark, ...] = ()
+    object: tuple[Mark, ...] = ()
+
+
+@dataclass
+class Prepared:
+    """A clip and what became of it; what is None was not reached."""
+
+    clip: Clip
+    scene: Scene
+    tracks: Tracks | None = None
+    motion: Motion | None = None
+    done: Reenactment | None = None
+    film: np.ndarray = field(default_factory=no_frames)  # (N, 84, 84, 3) uint8, as `--video` reads it
+    file: bytes = b""  # the same film as an mp4
+    why_not: str = ""  # if the clip is not usable
+    notes: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+
+    @property
+    def verdict(self) -> str:
+        """What the command's first line says, and the page's title."""
+        if self.why_not:
+            return f"not usable: {self.why_not}"
+        several = f", with {len(self.warnings)} warnings" if self.warnings else ""
+        return "usable" + (", with a warning" if len(self.warnings) == 1 else several)
+
+
+def parser() -> Parser:
+    """The arguments of `prepare`."""
+    p = Parser("prepare", "Make a clip of an arm into a human video of a task, and say how.")
+    p.add_task()
+    add = p.add_argument
+    add("file", type=Path, metavar="FILE", help="the clip, as a phone or a webcam wrote it")
+    add(
+        "--from",
+        type=seconds,
+        dest="first",
+        default=0.0,
+        metavar="S",
+        help="leave out what is before",
+    )
+    add("--to", type=seconds, dest="last", default=math.inf, metavar="S", help="and after")
+    add("--mirror", action=argparse.BooleanOptionalAction, help="left for right (as it goes)")
+    add(
+        "--tip",
+        type=mark,
+        action="append",
+        default=[],
+        metavar="X,Y@S",
+        help=f"where the tip is: {WHERE}",
+    )
+    add(
+        "--object",
+        type=mark,
+        action="append",
+        default=[],
+        metavar="X,Y@S",
+        help=f"and the object: {WHERE}",
+    )
+    add("--out", type=Path, metavar="DIR", help="its folder (runs/prepare/TASK)")
+    return p
+
+
+def seconds(text: str) -> float:
+    """A type for argparse: a time in a clip, in s."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0 <= value < math.inf:
+        raise argparse.ArgumentTypeError(f"{text!r} is no time in seconds from 0 on")
+    return value
+
+
+def mark(text: str) -> Mark:
+    """A type for argparse: X,Y@S, a place in a clip in pixels, and a time in s."""
+    try:
+        where, when = text.split("@")
+        x, y = (float(part) for part in where.split(","))
+        return x, y, seconds(when)
+    except (ValueError, argparse.ArgumentTypeError):
+        raise argparse.ArgumentTypeError(f"{text!r} is no place and time like 120,85@1.5") from None
+
+
+def main(argv: list[str]) -> int:
+    """Prepare the clip, print the verdict, and return the exit code: 2 if it is not usable.
+
+    Raises InputError for a mistake in the arguments.
+    """
+    args = parser().read(argv)
+    if not args.file.is_file():
+        raise InputError(f"{args.file}: there is no such file; check the path.")
+    choices = Choices(args.first, args.last, args.mirror, tuple(args.tip), tuple(args.object))
+    out = args.out or Path("runs") / "prepare" / args.task
+    try:
+        result = prepare(args.task, args.file, choices)
+    except InputError as error:  # no picture to show
+        print(f"not usable: {error}")
+        return 2
+    make_folder(out)
+    page = write(out, args.task, result, shlex.join(["python", "-m", "tasks", "prepare", *argv]))
+    print(f"{result.verdict}\npage: {page}")
+    for warning in result.warnings:
+        print(f"warning: {warning}")
+    if result.why_not:
+        return 2
+    print(f"learn: python -m tasks {args.task} --video {out / FILM}")
+    return 0
+
+
+def prepare(name: str, path: Path, choices: Choices | None = None) -> Prepared:
+    """The clip in the file `path` as a human video of the task `name`.
+
+    Raises InputError if the file cannot be read as a video. A clip that can be read and not used is
+    returned as it is, with the reason.
+    """
+    clip = read_clip(path)
+    env = tasks.bare(name, embodiment="human")
+    try:
+        first, _ = env.reset(seed=0)
+        result = Prepared(clip, env.scene(), notes=list(clip.notes))
+        if is_own(clip, first):
+            take_as_it_is(result)
+            return result
+        try:
+            result.motion = follow(result, choices or Choices())
+            result.done = reenact(env, result.motion)
+        except Unusable as error:
+            result.why_not = str(error)
+    finally:
+        env.close()
+    if result.motion:
+        result.notes += result.motion.notes
+        result.warnings += result.motion.warnings
+    if result.done:
+        result.notes += result.done.notes
+        result.warnings += result.done.warnings
+        keep(result, result.done.frames)
+    return result
+
+
+def usable(name: str, path: Path) -> Prepared:
+    """The user's clip, re-enacted for the task; what is odd about it is said.
+
+    Raises InputError if it is not usable.
+    """
+    clip = prepare(name, path)
+    if clip.why_not:
+        raise InputError(f"{path}: {clip.why_not}")
+    for warning in clip.warnings:
+        print(f"warning: {path}: {warning}", file=sys.stderr)
+    return clip
+
+
+def follow(result: Prepared, choices: Choices) -> Motion:
+    """Find tip and object in the clip, and lay their motion into the scene.
+
+    Raises Unusable if that cannot be done.
+    """
+    clip = result.clip
+    inside = (clip.times >= choices.first) & (clip.times <= choices.last)
+    if inside.sum() < 2:
+        raise Unusable(
+            f"nothing is left of {clip.times[-1]:.1f} s", "give other times to --from and --to"
+        )
+    start, stop = int(np.argmax(inside)), len(inside) - int(np.argmax(inside[::-1]))
+    frames, cuts = clip.frames[start:stop], [c - start for c in clip.cuts if start < c < stop]
+    result.warnings += footage.check(frames, tuple(cuts))
+    found = look(frames)
+    tracks = Tracks(
+        clip.times[start:stop], found.tip, found.object, found.tip_sure, found.object_sure,
+        min(frames.shape[1:3]), tuple(cuts),
+    )  # fmt: skip
+    tracks = tracks.marked("tip", list(choices.tip)).marked("object", list(choices.object))
+    result.tracks = tracks
+    rate = (len(frames) - 1) / max(1e-9, tracks.times[-1] - tracks.times[0])
+    result.notes.append(
+        f"{len(frames)} frames at {rate:.3g} a second; their motion was smoothed and taken at "
+        f"{FPS} a second, by the time stamps."
+    )
+    return lay(tracks, result.scene, choices.mirror)
+
+
+def look(frames: np.ndarray) -> Found:
+    """Tip and object in a clip's frames, as the shipped detector sees them."""
+    return refine(frames, Detector.load(EYES).detect(frames))
+
+
+def is_own(clip: Clip, first: np.ndarray) -> bool:
+    """Whether the clip begins with the frame `first` (84, 84, 3), as the kit's own films do.
+
+    Such a film is what a re-enactment would be, and needs none.
+    """
+    h, w = clip.frames.shape[1:3]
+    if h != w or np.median(np.diff(clip.times)) > OWN_STEP:
+        return False
+    off = np.abs(square(clip.frames[0]).astype(int) - first)
+    return bool(np.percentile(off, 99) < OWN)
+
+
+def square(frame: np.ndarray) -> np.ndarray:
+    """A square frame of any size as one of (84, 84, 3)."""
+    return cv2.resize(frame, (video.SIZE, video.SIZE), interpolation=cv2.INTER_AREA)
+
+
+def take_as_it_is(result: Prepared) -> None:
+    """Take a film of the kit's own, 25 frames a second by its time stamps."""
+    times = result.clip.times
+    t = np.arange(times[0], times[-1] + 0.5 / FPS, 1 / FPS)
+    nearest = np.abs(times[None] - t[:, None]).argmin(axis=1)
+    keep(result, np.stack([square(result.clip.frames[i]) for i in nearest]))
+    result.notes.append("It was filmed by the kit's own camera, and is taken as it is.")
+
+
+def keep(result: Prepared, frames: np.ndarray) -> None:
+    """Keep the film as a file, and as it comes back from it: that is what is learnt from."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / FILM
+        video.write(path, frames, FPS)
+        result.file, result.film = path.read_bytes(), video.read(path)[0]
+
+
+def write(out: Path, name: str, result: Prepared, command: str) -> Path:
+    """Write the page, and the film of a usable clip, into the folder `out`. Returns the page."""
+    shown, columns = None, tuple[np.ndarray, ...]()
+    if len(result.film):
+        write_atomic(out / FILM, result.file)
+        perception = imitate.load_perception(tasks.WEIGHTS / name, name)
+        shown = spread(len(result.film), SHOWN)
+        translated = perception.translate(result.film[shown])
+        columns = result.film[shown], translated, perception.detect(translated)
+    page, clip = out / PAGE, result.clip
+    write_page(
+        page, task=name, command=command, verdict=result.verdict, frames=clip.frames,
+        times=clip.times, scene=result.scene, notes=result.notes, warnings=result.warnings,
+        tracks=result.tracks, motion=result.done.motion if result.done else result.motion,
+        states=result.done.recording.states if result.done else None, columns=columns, shown=shown,
+    )  # fmt: skip
+    return page
