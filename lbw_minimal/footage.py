@@ -16,15 +16,17 @@ from lbw_minimal.paths import Unusable
 from lbw_minimal.video import LOOK_AT, MOVED, MOVED_SHARE, SIZE, STEADY, high_pass, steadiness
 
 SHAKEN = 0.80  # steadiness of a drawn room that is panned by 10 of 84 pixels; STEADY is a warning
-LARGE = 0.03  # of the picture: what moves and is smaller is no person's arm
-DEEP = 0.15  # of the picture's width: so far does an arm come in from the edge
-BOTH = 0.2  # of the frames: so often there have to be arms from both sides
+LARGE = 0.01  # of the picture: less that moves is no arm
+EDGE = 3  # pixels from the picture's edge, over which an arm comes in
+LAG = 3  # of the frames that are looked at, in which an arm moves by less than its width
+APART = 0.15  # of the width: so far apart are the arms of two people
+OFTEN = 0.2  # of the frames in which two arms move
 
 
 def check(frames: np.ndarray, cuts: tuple[int, ...] = ()) -> list[str]:
     """Warnings about the frames; cuts: frames with which a new shot begins.
 
-    Raises Unusable if nothing moves, if the camera moves, or if arms come in from both sides.
+    Raises Unusable if nothing moves, if the camera moves, or if two arms do the moving.
     """
     edges = [0, *cuts, len(frames)]
     first, last = max(pairwise(edges), key=lambda shot: shot[1] - shot[0])
@@ -40,9 +42,10 @@ def check(frames: np.ndarray, cuts: tuple[int, ...] = ()) -> list[str]:
         raise Unusable(
             "the camera moves", "put it on a stand or lean it against something, and film again"
         )
-    if np.mean([_from_both_sides(frame) for frame in moves]) > BOTH:
+    steps = np.abs(still[LAG:] - still[:-LAG]) > MOVED  # (T - LAG, 84, 84)
+    if len(steps) and np.mean([_two_arms(step) for step in steps]) > OFTEN:
         raise Unusable(
-            "arms come in from the left and from the right, as of several people",
+            "two arms come in from the edge of the picture, far apart, as of several people",
             "film one arm, and let nothing else move near the edges",
         )
     if steady < STEADY:
@@ -54,14 +57,14 @@ def _small(frame):
     return cv2.resize(frame, (SIZE, SIZE), interpolation=cv2.INTER_AREA)
 
 
-def _from_both_sides(moves):
-    """Whether two separate things that move (84, 84) come in from the left and the right edge."""
-    closed = cv2.morphologyEx(moves.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((7, 7), np.uint8))
+def _two_arms(moves):
+    """Whether two things that move (84, 84) come in over the edge, one beside the other."""
+    closed = cv2.morphologyEx(moves.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((9, 9), np.uint8))
     _, _, stats, _ = cv2.connectedComponentsWithStats(closed)
-    left = right = False
-    for x, _, width, _, area in stats[1:]:
-        if area >= LARGE * moves.size and width >= DEEP * SIZE:
-            at_left, at_right = x <= 1, x + width >= SIZE - 1
-            left |= bool(at_left and not at_right)
-            right |= bool(at_right and not at_left)
-    return left and right
+    spans = sorted(
+        (x, x + width)
+        for x, y, width, height, area in stats[1:].tolist()
+        if area >= LARGE * moves.size
+        and (min(x, y) <= EDGE or max(x + width, y + height) >= SIZE - EDGE)
+    )
+    return any(b[0] - a[1] >= APART * SIZE for a, b in pairwise(spans))

@@ -179,7 +179,7 @@ def ends(path: np.ndarray, least: float, what: str) -> tuple[np.ndarray, np.ndar
             "film the task being done, so near that it goes across a quarter of the picture",
         )
     moving = int(np.argmax(away > 2 * RESTS * away[far]))
-    there = np.abs(away - away[far]) < RESTS * away[far]
+    there = np.linalg.norm(path - path[far], axis=1) < RESTS * away[far]
     return np.median(path[:moving], axis=0), np.median(path[there], axis=0)
 
 

@@ -40,6 +40,7 @@ LIFTED = 0.35  # of its way: what leaves the straight line by more was picked up
 AHEAD = 0.25  # of its way: a tip so far in front of the object does not push it
 CARRIED = 0.85  # of its way: a hand that goes along so far has not hit
 OUTSIDE = 0.02  # m out of the tip's box; until then the approach stands in for the clip
+TOO_FAST = 1.5  # times what it may ask for: slowed down by more is worth a warning
 HURRY = 0.8  # of the arm's top speed that a motion may ask for: the rest is for corrections
 
 
@@ -273,10 +274,10 @@ def pace(motion: Motion, scene: Scene) -> Motion:
     slow = np.maximum(1, steps / (HURRY * scene.step))
     n, longest = 1 + slow.sum(), round(LONGEST * FPS)
     warnings = list(motion.warnings)
-    if n > 1.1 * len(motion.tip):
+    if slow.max(initial=1) > TOO_FAST:
         warnings.append(
-            f"The hand is faster than the scene's arm: {len(motion.tip) / FPS:.1f} s of motion "
-            f"take {n / FPS:.1f}."
+            f"The hand is up to {HURRY * slow.max():.1f} times as fast as the scene's arm can be, "
+            "and was slowed down there."
         )
     if n > longest and not scene.hit:
         warnings.append(f"{n / FPS:.0f} s are long; the motion was hurried to {LONGEST:.0f} s.")

@@ -1,0 +1,78 @@
+"""Footage that cannot be searched for an arm: nothing moves, the camera does, or two people do."""
+
+import cv2
+import numpy as np
+import pytest
+
+from lbw_minimal import footage, video
+from lbw_minimal.paths import Unusable
+from tasks import TASKS, VIDEOS
+
+SIZE = 120, 160  # pixels, height and width
+
+
+@pytest.fixture(scope="module")
+def room():
+    """A room with clutter, wider than the camera sees of it."""
+    rng = np.random.default_rng(0)
+    rough = rng.integers(60, 200, (24, 50, 3), np.uint8)
+    return cv2.resize(rough, (300, 160), interpolation=cv2.INTER_CUBIC)
+
+
+def arms(room, *sides, frames=30):
+    """Arms that come in from those sides, before a camera that stands still."""
+    film = np.repeat(room[None, : SIZE[0], : SIZE[1]], frames, axis=0).copy()
+    skin = room[::-1, : SIZE[1]] // 2 + 90
+    for i, frame in enumerate(film):
+        reach = max(1, 3 * i - 20)
+        for side in sides:
+            span = slice(0, reach) if side == "left" else slice(SIZE[1] - reach, SIZE[1])
+            moved = skin[:22, -reach:] if side == "left" else skin[:22, :reach]  # with the arm
+            frame[40:62, span] = moved
+    return film
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_one_arm_before_a_camera_that_stands_still_is_fine(room, side):
+    assert footage.check(arms(room, side)) == []
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_our_own_human_videos_are_fine(name):
+    frames, _ = video.read(VIDEOS / name / "expert_01.mp4")
+    assert footage.check(frames) == []
+
+
+def still(room):
+    noise = np.random.default_rng(1).normal(0, 3, (20, *SIZE, 3))
+    return np.clip(room[: SIZE[0], : SIZE[1]] + noise, 0, 255).astype(np.uint8), "nothing moves"
+
+
+def panned(room):
+    x = np.linspace(0, 60, 30).astype(int)
+    return np.stack([room[: SIZE[0], i : i + SIZE[1]] for i in x]), "the camera moves"
+
+
+def hand_held(room):
+    sway = np.random.default_rng(2).integers(0, 12, (30, 2))
+    film = arms(room, "left")
+    return np.stack([np.roll(f, s, (0, 1)) for f, s in zip(film, sway, strict=True)]), "the camera"
+
+
+def two_people(room):
+    return arms(room, "left", "right"), "several people"
+
+
+@pytest.mark.parametrize("fault", [still, panned, hand_held, two_people], ids=lambda f: f.__name__)
+def test_other_footage_is_refused_with_the_reason(room, fault):
+    frames, reason = fault(room)
+    with pytest.raises(Unusable, match=reason):
+        footage.check(frames)
+
+
+def test_a_cut_to_another_place_is_no_moving_camera(room):
+    film = arms(room, "left")
+    title = np.repeat(room[None, 30 : 30 + SIZE[0], 90 : 90 + SIZE[1]], 12, axis=0)
+    assert footage.check(np.concatenate([title, film]), cuts=(12,)) == []
+    with pytest.raises(Unusable, match="the camera moves"):
+        footage.check(np.concatenate([title, film]))
