@@ -2,18 +2,20 @@
 
 In: frames (T, H, W, 3) uint8 of any size. Nothing is found here, only what spoils a search: a clip
 in which nothing moves, or the camera does, or a second person. The measures are those of
-`video.py`, taken on small pictures.
+`motion.py` and `video.py`, taken on small pictures.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 import cv2
 import numpy as np
 
+from lbw_minimal.motion import MOVED, SMALL, differs, high_pass, small, some
 from lbw_minimal.paths import Unusable
-from lbw_minimal.video import LOOK_AT, MOVED, MOVED_SHARE, SIZE, STEADY, high_pass, steadiness
+from lbw_minimal.video import STEADY, _steadiness
 
 SHAKEN = 0.80  # steadiness of a drawn room that is panned by 10 of 84 pixels; STEADY is a warning
 LARGE = 0.01  # of the picture: less that moves is no arm
@@ -23,21 +25,18 @@ APART = 0.15  # of the width: so far apart are the arms of two people
 OFTEN = 0.2  # of the frames in which two arms move
 
 
-def check(frames: np.ndarray, cuts: tuple[int, ...] = ()) -> list[str]:
+def check(frames: np.ndarray, cuts: Sequence[int] = ()) -> list[str]:
     """Warnings about the frames; cuts: frames with which a new shot begins.
 
     Raises Unusable if nothing moves, if the camera moves, or if two arms do the moving.
     """
     edges = [0, *cuts, len(frames)]
     first, last = max(pairwise(edges), key=lambda shot: shot[1] - shot[0])
-    pick = first + np.linspace(0, last - first - 1, min(last - first, LOOK_AT)).astype(int)
-    small = np.stack([_small(frames[i]) for i in pick])
-    still = high_pass(small)
+    still = high_pass(np.stack([small(frame) for frame in some(frames[first:last])]))
     background = np.median(still, axis=0)  # (84, 84)
-    moves = np.abs(still - background) > MOVED  # (T, 84, 84)
-    if moves.mean(axis=(1, 2)).max() < MOVED_SHARE:
+    if not differs(still, background).any():
         raise Unusable("nothing moves in the clip", "film an arm that does the task")
-    steady = steadiness(still, background)
+    steady = _steadiness(still, background)
     if steady < SHAKEN:
         raise Unusable(
             "the camera moves", "put it on a stand or lean it against something, and film again"
@@ -53,10 +52,6 @@ def check(frames: np.ndarray, cuts: tuple[int, ...] = ()) -> list[str]:
     return []
 
 
-def _small(frame):
-    return cv2.resize(frame, (SIZE, SIZE), interpolation=cv2.INTER_AREA)
-
-
 def _two_arms(moves):
     """Whether two things that move (84, 84) come in over the edge, one beside the other."""
     closed = cv2.morphologyEx(moves.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((9, 9), np.uint8))
@@ -65,6 +60,6 @@ def _two_arms(moves):
         (x, x + width)
         for x, y, width, height, area in stats[1:].tolist()
         if area >= LARGE * moves.size
-        and (min(x, y) <= EDGE or max(x + width, y + height) >= SIZE - EDGE)
+        and (min(x, y) <= EDGE or max(x + width, y + height) >= SMALL - EDGE)
     )
-    return any(b[0] - a[1] >= APART * SIZE for a, b in pairwise(spans))
+    return any(b[0] - a[1] >= APART * SMALL for a, b in pairwise(spans))

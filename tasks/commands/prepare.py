@@ -12,7 +12,7 @@ import math
 import shlex
 import sys
 import tempfile
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import cv2
@@ -34,7 +34,7 @@ FILM, PAGE = "reenactment.mp4", "prepare.html"
 SHOWN = 60  # frames of the page's film, which are translated as well: 4 s of work on one core
 OWN = 12  # grey levels: the kit's own films begin with the scene's picture to within 6 of 256
 OWN_STEP = 0.05  # s between frames: a film that is slower has to be interpolated, as a motion
-EYES = tasks.WEIGHTS / "eyes.safetensors"  # the detector of tip and object
+EYES = tasks.WEIGHTS / "eyes" / "eyes.safetensors"  # the detector of tip and object
 WHERE = "pixels from the left and the upper edge, and seconds; may be given several times"
 
 Mark = tuple[float, float, float]  # x, y in pixels of the clip, s
@@ -50,7 +50,7 @@ class Choices:
     """What the user decides instead of the clip."""
 
     first: float = 0.0  # s
-    last: float = math.inf  # s
+    last: float | None = None  # s
     mirror: bool | None = None
     tip: tuple[Mark, ...] = ()
     object: tuple[Mark, ...] = ()
@@ -65,7 +65,9 @@ class Prepared:
     tracks: Tracks | None = None
     motion: Motion | None = None
     done: Reenactment | None = None
-    film: np.ndarray = field(default_factory=no_frames)  # (N, 84, 84, 3) uint8, as `--video` reads it
+    film: np.ndarray = field(
+        default_factory=no_frames
+    )  # (N, 84, 84, 3) uint8, as `--video` reads it
     file: bytes = b""  # the same film as an mp4
     why_not: str = ""  # if the clip is not usable
     notes: list[str] = field(default_factory=list)
@@ -94,7 +96,7 @@ def parser() -> Parser:
         metavar="S",
         help="leave out what is before",
     )
-    add("--to", type=seconds, dest="last", default=math.inf, metavar="S", help="and after")
+    add("--to", type=seconds, dest="last", metavar="S", help="and after")
     add("--mirror", action=argparse.BooleanOptionalAction, help="left for right (as it goes)")
     add(
         "--tip",
@@ -169,16 +171,18 @@ def prepare(name: str, path: Path, choices: Choices | None = None) -> Prepared:
     Raises InputError if the file cannot be read as a video. A clip that can be read and not used is
     returned as it is, with the reason.
     """
-    clip = read_clip(path)
+    choices = choices or Choices()
+    clip = read_clip(path, start=choices.first or None, end=choices.last)
+    clip = replace(clip, times=clip.times + choices.first)
     env = tasks.bare(name, embodiment="human")
     try:
         first, _ = env.reset(seed=0)
-        result = Prepared(clip, env.scene(), notes=list(clip.notes))
+        result = Prepared(clip, env.scene(), notes=[*clip.notes], warnings=[*clip.losses])
         if is_own(clip, first):
             take_as_it_is(result)
             return result
         try:
-            result.motion = follow(result, choices or Choices())
+            result.motion = follow(result, choices)
             result.done = reenact(env, result.motion)
         except Unusable as error:
             result.why_not = str(error)
@@ -212,19 +216,12 @@ def follow(result: Prepared, choices: Choices) -> Motion:
 
     Raises Unusable if that cannot be done.
     """
-    clip = result.clip
-    inside = (clip.times >= choices.first) & (clip.times <= choices.last)
-    if inside.sum() < 2:
-        raise Unusable(
-            f"nothing is left of {clip.times[-1]:.1f} s", "give other times to --from and --to"
-        )
-    start, stop = int(np.argmax(inside)), len(inside) - int(np.argmax(inside[::-1]))
-    frames, cuts = clip.frames[start:stop], [c - start for c in clip.cuts if start < c < stop]
-    result.warnings += footage.check(frames, tuple(cuts))
+    clip, frames = result.clip, result.clip.frames
+    result.warnings += footage.check(frames, clip.cuts)
     found = look(frames)
     tracks = Tracks(
-        clip.times[start:stop], found.tip, found.object, found.tip_sure, found.object_sure,
-        min(frames.shape[1:3]), tuple(cuts),
+        clip.times, found.tip, found.object, found.tip_sure, found.object_sure,
+        min(frames.shape[1:3]), tuple(clip.cuts),
     )  # fmt: skip
     tracks = tracks.marked("tip", list(choices.tip)).marked("object", list(choices.object))
     result.tracks = tracks
