@@ -98,8 +98,8 @@ def _measured_push(env, motion):
         end = _rehearse(env, motion, further)
         miss = float(end.states[-1, 6] - end.states[-1, 3])
         tried.append((not end.success[-1], abs(miss), further))
-        if abs(miss) < CLOSE:
-            break
+        if abs(miss) < CLOSE or (len(tried) > 1 and abs(miss) > 0.9 * tried[-2][1]):
+            break  # it is there, or comes no nearer
         further += miss
     failed, _, further = min(tried)
     return further, not failed

@@ -1,0 +1,167 @@
+"""`python -m tasks prepare`: a filmed clip goes in, a page, a film and a verdict come out."""
+
+import numpy as np
+import pytest
+
+from lbw_minimal import video
+from lbw_minimal.clip import read_clip
+from lbw_minimal.clip_page import write_page
+from lbw_minimal.detector import Found
+from lbw_minimal.paths import Unusable
+from lbw_minimal.training import InputError
+from tasks import VIDEOS, bare
+from tasks.__main__ import main
+from tasks.commands import prepare
+from tasks.commands.job import check, parser
+from tasks.commands.prepare import Choices, Prepared, follow
+from tasks.world import record_expert
+from tasks.world.scene import FPS
+
+SCALE = 3  # times the kit's frames: the clip's pixels
+
+
+@pytest.fixture(scope="module")
+def filmed(tmp_path_factory):
+    """A push from the right, as a file, and where tip and object are in it."""
+    env = bare("push", embodiment="human")
+    frames, pixels, _ = record_expert(env, 3)
+    env.close()
+    path = tmp_path_factory.mktemp("clips") / "my push.mp4"
+    video.write(path, frames[:, :, ::-1], FPS, SCALE)
+    pixels = SCALE * (pixels * (-1, 1, -1, 1) + (84, 0, 84, 0))
+    sure = np.ones(len(frames))
+    return path, Found(pixels[:, :2], pixels[:, 2:], sure, sure)
+
+
+@pytest.fixture
+def eyes(filmed, monkeypatch):
+    """A detector that is told the truth; what it says can be set."""
+    monkeypatch.setattr(prepare, "look", lambda frames: eyes.found)
+    eyes.found = filmed[1]
+    return eyes
+
+
+def blind(found):
+    return Found(0 * found.tip, 0 * found.object, 0 * found.tip_sure, 0 * found.object_sure)
+
+
+def test_a_clip_becomes_a_human_video_that_the_kit_takes_as_its_own(filmed, eyes, tmp_path, capfd):
+    assert main(["prepare", "push", str(filmed[0]), "--out", str(tmp_path)]) == 0
+    out = capfd.readouterr().out
+    film = tmp_path / "reenactment.mp4"
+    assert out.startswith("usable\npage: ") and out.endswith(f"push --video {film}\n")
+    page = (tmp_path / "prepare.html").read_text()
+    for part in ("Push: usable", "mirrored", "What was found", "in the scene", "--tip X,Y@S"):
+        assert part in page
+    assert page.count("data-time=") == 12 and page.count("data:image/webp") == 13
+    assert "http" not in page.replace("http://www.w3.org", "")  # it needs no network
+
+    again = prepare.prepare("push", film)
+    assert again.notes[-1].endswith("taken as it is.") and again.motion is None
+    assert len(again.film) == len(video.read(film)[0]) > 40
+    green, red = again.film[-1, 58:68, 50:66], again.film[0, 55:68, 30:45]
+    assert (green[..., 0] > 150).any() and (red[..., 0] > 150).any()  # the cube, at its two places
+
+
+def test_what_is_not_usable_ends_with_2_and_a_page_that_says_why(filmed, eyes, tmp_path, capfd):
+    eyes.found = blind(eyes.found)
+    assert main(["prepare", "push", str(filmed[0]), "--out", str(tmp_path)]) == 2
+    assert capfd.readouterr().out.startswith("not usable: no arm is seen")
+    page = (tmp_path / "prepare.html").read_text()
+    assert "Push: not usable" in page and "film from the side" in page and "data-time=" in page
+    assert not (tmp_path / "reenactment.mp4").exists()
+
+
+def test_a_file_that_is_no_video_is_not_usable(tmp_path, capfd):
+    path = tmp_path / "text.mp4"
+    path.write_text("not a video")
+    assert main(["prepare", "push", str(path), "--out", str(tmp_path / "out")]) == 2
+    out, err = capfd.readouterr()
+    assert out.startswith(f"not usable: {path}") and err == ""
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_missing_file_is_a_mistake(tmp_path, capfd):
+    assert main(["prepare", "push", str(tmp_path / "no.mp4")]) == 2
+    assert "there is no such file" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "wrong", [["--tip", "3;4@1"], ["--object", "3,4"], ["--from", "-1"], ["--to", "end"]]
+)
+def test_a_mark_or_a_time_that_is_none_is_named(wrong, tmp_path, capfd):
+    (tmp_path / "a.mp4").touch()
+    assert main(["prepare", "push", str(tmp_path / "a.mp4"), *wrong]) == 2
+    assert repr(wrong[1]) in capfd.readouterr().err
+
+
+@pytest.fixture(scope="module")
+def scene():
+    env = bare("push", observation="state")
+    env.reset(seed=0)
+    yield env.scene()
+    env.close()
+
+
+def test_marks_in_the_clips_pixels_and_seconds_do_what_a_detector_does(filmed, eyes, scene):
+    path, truth = filmed
+    clip = read_clip(path)
+    seen = follow(Prepared(clip, scene), Choices())
+    eyes.found = blind(truth)
+    marks = [
+        tuple((*points[i].tolist(), clip.times[i]) for i in range(len(clip.times)))
+        for points in (truth.tip, truth.object)
+    ]
+    marked = follow(Prepared(clip, scene), Choices(tip=marks[0], object=marks[1]))
+    np.testing.assert_allclose(marked.tip, seen.tip, atol=1e-9)
+
+
+def test_the_user_decides_which_seconds_count_and_what_is_mirrored(filmed, eyes, scene):
+    path, _ = filmed
+    prepared = prepare.prepare("push", path, Choices(mirror=False))
+    assert "leave out --mirror or --no-mirror" in prepared.why_not
+    eyes.found = Found(
+        *(getattr(eyes.found, n)[20:30] for n in ("tip", "object", "tip_sure", "object_sure"))
+    )
+    short = prepare.prepare("push", path, Choices(first=20 / FPS - 0.01, last=29 / FPS + 0.01))
+    assert len(short.clip.frames) == 10 and short.clip.times[0] == pytest.approx(0.8, abs=0.05)
+
+
+def test_learning_from_a_clip_keeps_the_shipped_eyes_and_the_page(tmp_path):
+    arguments = ["--video", str(VIDEOS / "push" / "expert_02.mp4"), "--out", str(tmp_path)]
+    job = check("push", parser("push").read(arguments), arguments)
+    assert job.trained is not None and not job.from_scratch
+    np.testing.assert_array_equal(job.demo[0], video.read(tmp_path / "reenactment.mp4")[0][0])
+    assert "Push: usable" in (tmp_path / "prepare.html").read_text()
+
+
+def test_the_papers_way_translates_the_clip_itself(tmp_path):
+    film = VIDEOS / "push" / "expert_02.mp4"
+    arguments = ["--video", str(film), "--translate-clip", "--out", str(tmp_path)]
+    job = check("push", parser("push").read(arguments), arguments)
+    assert job.from_scratch and job.trained is None and len(job.random) == 0
+    np.testing.assert_array_equal(job.demo, video.read(film)[0])
+    assert not (tmp_path / "prepare.html").exists()
+
+
+def test_a_clip_that_is_not_usable_teaches_nothing(filmed, eyes, tmp_path):
+    eyes.found = blind(eyes.found)
+    arguments = ["--video", str(filmed[0]), "--out", str(tmp_path / "run")]
+    with pytest.raises(InputError, match=r"my push\.mp4: no arm is seen"):
+        check("push", parser("push").read(arguments), arguments)
+    assert not (tmp_path / "run").exists()
+
+
+def test_the_page_is_safe_from_the_names_of_files(scene, tmp_path):
+    frames = np.zeros((3, 90, 120, 3), np.uint8)
+    write_page(
+        tmp_path / "page.html", task="push", command="prepare push '</script><b>.mp4'",
+        verdict="not usable: <i>", frames=frames, times=np.arange(3.0), scene=scene,
+        notes=["<u>"], warnings=["<s>"],
+    )  # fmt: skip
+    page = (tmp_path / "page.html").read_text()
+    assert not [tag for tag in ("<b>.mp4", "<i>", "<u>", "<s>") if tag in page]
+
+
+def test_reasons_are_sentences():
+    assert str(Unusable("it rains", "wait")) == "it rains; wait."
