@@ -246,10 +246,12 @@ OPTIONS = sorted(set().union(*(parser.options() for parser in PARSERS.values()))
 @pytest.mark.parametrize("command", PARSERS)
 def test_every_option_is_a_commands_own_or_refused_with_the_name_of_its_command(command, option):
     parser = PARSERS[command]
-    needed = ["push"] if any(a.dest == "task" for a in parser._actions) else []
+    takes = [action.dest for action in parser._actions]
+    needed = ["push"] * ("task" in takes) + ["my.mp4"] * ("file" in takes)
     if option in parser.options():
         action = parser._option_string_actions[option]
         values = {"--set": "K=3", "--reward": "literal", "--without": "trim", "--jitter": "0.02"}
+        values |= {"--tip": "3,4@1", "--object": "3,4@1"}
         value = values.get(option, "200")
         value = action.choices[-1] if action.choices else value
         args = parser.read([*needed, option] + [value] * (action.nargs != 0))

@@ -33,6 +33,12 @@ def filmed(tmp_path_factory):
     return path, Found(pixels[:, :2], pixels[:, 2:], sure, sure)
 
 
+@pytest.fixture(autouse=True)
+def a_short_film(monkeypatch):
+    """Translating is slow, and four steps show it."""
+    monkeypatch.setattr(prepare, "SHOWN", 4)
+
+
 @pytest.fixture
 def eyes(filmed, monkeypatch):
     """A detector that is told the truth; what it says can be set."""
@@ -79,6 +85,11 @@ def test_a_file_that_is_no_video_is_not_usable(tmp_path, capfd):
     out, err = capfd.readouterr()
     assert out.startswith(f"not usable: {path}") and err == ""
     assert not (tmp_path / "out").exists()
+
+
+def test_a_clip_of_too_few_pixels_is_not_usable(filmed, eyes, tmp_path):
+    video.write(tmp_path / "tiny.mp4", video.read(filmed[0])[0][:, ::2, ::2], FPS, 1)
+    assert "42x42 pixels are too few" in prepare.prepare("push", tmp_path / "tiny.mp4").why_not
 
 
 def test_a_missing_file_is_a_mistake(tmp_path, capfd):

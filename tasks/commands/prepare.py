@@ -217,11 +217,16 @@ def follow(result: Prepared, choices: Choices) -> Motion:
     Raises Unusable if that cannot be done.
     """
     clip, frames = result.clip, result.clip.frames
+    height, width = frames.shape[1:3]
+    if min(height, width) < video.SIZE:
+        raise Unusable(
+            f"{width}x{height} pixels are too few", f"film at {video.SIZE}x{video.SIZE} or more"
+        )
     result.warnings += footage.check(frames, clip.cuts)
     found = look(frames)
     tracks = Tracks(
         clip.times, found.tip, found.object, found.tip_sure, found.object_sure,
-        min(frames.shape[1:3]), tuple(clip.cuts),
+        min(height, width), tuple(clip.cuts),
     )  # fmt: skip
     tracks = tracks.marked("tip", list(choices.tip)).marked("object", list(choices.object))
     result.tracks = tracks
