@@ -58,8 +58,8 @@ pre.textContent = base;
 document.querySelectorAll(".clip img").forEach(img => img.addEventListener("click", e => {
   const what = document.querySelector("[name=what]:checked").value;
   const box = img.getBoundingClientRect();
-  const x = (e.clientX - box.left) / box.width * img.dataset.width;
-  const y = (e.clientY - box.top) / box.height * img.dataset.height;
+  const x = Math.max(0, (e.clientX - box.left) / box.width * img.dataset.width);
+  const y = Math.max(0, (e.clientY - box.top) / box.height * img.dataset.height);
   marks.push(`--${what} ${x.toFixed(0)},${y.toFixed(0)}@${img.dataset.time}`);
   pre.textContent = [base, ...marks].join(" ");
 }));
@@ -68,7 +68,10 @@ document.querySelectorAll(".clip img").forEach(img => img.addEventListener("clic
 OPTIONS = [
     ("--from S, --to S", "use only what is between these seconds of the clip"),
     ("--mirror, --no-mirror", "turn left into right, or do not"),
-    ("--tip X,Y@S", "the tip of the hand is at these pixels at that second"),
+    (
+        "--tip X,Y@S",
+        "the tip of the hand is at these pixels, of the pictures above, at that second",
+    ),
     ("--object X,Y@S", "and the object at these"),
 ]
 SCENE = """

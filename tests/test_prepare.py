@@ -127,6 +127,11 @@ def test_marks_in_the_clips_pixels_and_seconds_do_what_a_detector_does(filmed, e
     np.testing.assert_allclose(marked.tip, seen.tip, atol=1e-9)
 
 
+def test_a_mark_outside_of_the_picture_is_named(filmed, eyes):
+    clip = prepare.prepare("push", filmed[0], Choices(tip=((1348.0, 418.0, 0.3),)))
+    assert clip.why_not.startswith("1348,418@0.3 is outside of 252x252 pixels")
+
+
 def test_the_user_decides_which_seconds_count_and_what_is_mirrored(filmed, eyes, scene):
     path, _ = filmed
     prepared = prepare.prepare("push", path, Choices(mirror=False))

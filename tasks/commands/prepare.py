@@ -35,7 +35,7 @@ SHOWN = 60  # frames of the page's film, which are translated as well: 4 s of wo
 OWN = 12  # grey levels: the kit's own films begin with the scene's picture to within 6 of 256
 OWN_STEP = 0.05  # s between frames: a film that is slower has to be interpolated, as a motion
 EYES = tasks.WEIGHTS / "eyes" / "eyes.safetensors"  # the detector of tip and object
-WHERE = "pixels from the left and the upper edge, and seconds; may be given several times"
+WHERE = "as a click into the page writes it; may be given several times"
 
 Mark = tuple[float, float, float]  # x, y in pixels of the clip, s
 
@@ -222,6 +222,13 @@ def follow(result: Prepared, choices: Choices) -> Motion:
         raise Unusable(
             f"{width}x{height} pixels are too few", f"film at {video.SIZE}x{video.SIZE} or more"
         )
+    for x, y, s in (*choices.tip, *choices.object):
+        if not (0 <= x <= width and 0 <= y <= height and clip.times[0] <= s <= clip.times[-1]):
+            raise Unusable(
+                f"{x:g},{y:g}@{s:g} is outside of {width}x{height} pixels and "
+                f"{clip.times[0]:.1f} to {clip.times[-1]:.1f} s",
+                "click into a frame of the page: it writes the place in the picture as it was read",
+            )
     result.warnings += footage.check(frames, clip.cuts)
     found = look(frames)
     tracks = Tracks(
