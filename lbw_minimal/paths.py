@@ -14,7 +14,7 @@ from lbw_minimal.training import InputError
 
 SMOOTH = 0.05  # s, sigma of the low-pass; a webcam's frames are 0.1 s apart, a phone's 0.03
 REST = 0.3  # s that are kept of a rest before the hand starts and after the object has arrived
-SURE = 0.3  # a point found with less is as good as not found
+SURE = 0.5  # a point found with less is as good as not found
 FOUND = 0.5  # share of the frames in which a point has to be found
 LEAST_FRAMES = 8  # of a piece: 0.3 s of a phone's, 0.8 s of a slow webcam's
 LEAST_WAY = 0.04  # of the picture's shorter side: a detector errs by 0.01

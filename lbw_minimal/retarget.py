@@ -36,6 +36,7 @@ APPROACH = 0.6  # s, from the arm's start to where the clip's hand comes into re
 RUN_UP = 2.0  # s before a hit that are kept
 LONGEST = 12.0  # s, the longest horizon of the tasks; only a hit cannot be hurried
 STEEP = 1.0  # height over width of the way; steeper, and it is not seen from the side
+UNSEEN = 0.4  # s, longer than a glitch of the detector
 LIFTED = 0.35  # of its way: what leaves the straight line by more was picked up
 AHEAD = 0.25  # of its way: a tip so far in front of the object does not push it
 CARRIED = 0.85  # of its way: a hand that goes along so far has not hit
@@ -88,8 +89,13 @@ def lay(tracks: Tracks, scene: Scene, mirror: bool | None = None) -> Motion:
     touched = scene.contact is not None
     tracks = longest_piece(tracks, touched, notes)
     t = np.arange(tracks.times[0], tracks.times[-1] + 1e-9, 1 / FPS)
-    tip = low_pass(*trusted(tracks, "tip"), t)  # (N, 2) pixels
-    thing = low_pass(*trusted(tracks, "object"), t) if touched else tip
+    tip = thing = low_pass(*trusted(tracks, "tip"), t)  # (N, 2) pixels
+    if touched:
+        seen, points = trusted(tracks, "object")
+        thing = low_pass(seen, points, t)
+        gap = float(np.diff(seen).max())
+        if gap > UNSEEN:
+            warnings.append(f"The object is not seen for {gap:.1f} s; an even way was assumed.")
     start, end = ends(thing, LEAST_WAY * tracks.side, "object" if touched else "hand")
     if mirror is None:
         mirror = bool(end[0] < start[0])

@@ -141,6 +141,13 @@ def test_what_is_not_sure_is_not_believed():
     assert at(lay(wild, SCENE), push, PUSHING)[:, 0].max() < 0.012
 
 
+def test_an_object_that_is_hidden_for_a_while_is_said():
+    tracks = clip()
+    hidden = (tracks.times > 1.2) & (tracks.times < 1.8)
+    motion = lay(replace(tracks, object_sure=np.where(hidden, 0.2, 1.0)), SCENE)
+    assert motion.warnings == ["The object is not seen for 0.6 s; an even way was assumed."]
+
+
 def test_a_single_glitch_is_taken_out():
     tracks = clip()
     tracks.object[45] += 200

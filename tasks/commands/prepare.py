@@ -33,6 +33,7 @@ from tasks.world.reenact import Reenactment, reenact
 FILM, PAGE = "reenactment.mp4", "prepare.html"
 SHOWN = 60  # frames of the page's film, which are translated as well: 4 s of work on one core
 OWN = 12  # grey levels: the kit's own films begin with the scene's picture to within 6 of 256
+SLACK = 0.01  # s: the page rounds times to 0.001
 OWN_STEP = 0.05  # s between frames: a film that is slower has to be interpolated, as a motion
 EYES = tasks.WEIGHTS / "eyes" / "eyes.safetensors"  # the detector of tip and object
 WHERE = "as a click into the page writes it; may be given several times"
@@ -178,7 +179,7 @@ def prepare(name: str, path: Path, choices: Choices | None = None) -> Prepared:
     try:
         first, _ = env.reset(seed=0)
         result = Prepared(clip, env.scene(), notes=[*clip.notes], warnings=[*clip.losses])
-        if is_own(clip, first):
+        if choices == Choices() and is_own(clip, first):
             take_as_it_is(result)
             return result
         try:
@@ -222,8 +223,9 @@ def follow(result: Prepared, choices: Choices) -> Motion:
         raise Unusable(
             f"{width}x{height} pixels are too few", f"film at {video.SIZE}x{video.SIZE} or more"
         )
+    first, last = clip.times[0] - SLACK, clip.times[-1] + SLACK
     for x, y, s in (*choices.tip, *choices.object):
-        if not (0 <= x <= width and 0 <= y <= height and clip.times[0] <= s <= clip.times[-1]):
+        if not (0 <= x <= width and 0 <= y <= height and first <= s <= last):
             raise Unusable(
                 f"{x:g},{y:g}@{s:g} is outside of {width}x{height} pixels and "
                 f"{clip.times[0]:.1f} to {clip.times[-1]:.1f} s",
