@@ -15,7 +15,7 @@ import numpy as np
 
 from lbw_minimal.motion import MOVED, SMALL, differs, high_pass, small, some
 from lbw_minimal.paths import Unusable
-from lbw_minimal.video import STEADY, _steadiness
+from lbw_minimal.video import STEADY, steadiness
 
 SHAKEN = 0.80  # steadiness of a drawn room that is panned by 10 of 84 pixels; STEADY is a warning
 LARGE = 0.01  # of the picture: less that moves is no arm
@@ -36,7 +36,7 @@ def check(frames: np.ndarray, cuts: Sequence[int] = ()) -> list[str]:
     background = np.median(still, axis=0)  # (84, 84)
     if not differs(still, background).any():
         raise Unusable("nothing moves in the clip", "film an arm that does the task")
-    steady = _steadiness(still, background)
+    steady = steadiness(still, background)
     if steady < SHAKEN:
         raise Unusable(
             "the camera moves", "put it on a stand or lean it against something, and film again"

@@ -103,12 +103,12 @@ def lay(tracks: Tracks, scene: Scene, mirror: bool | None = None) -> Motion:
             notes.append("It goes to the left in the clip, and was mirrored.")
     A = fit(start, end, scene, mirror)
     x, way = apply(A, tip), progress(thing, start, end)  # (N, 2) m, (N,) from 0 to 1
+    i, j = (int(np.argmax(way >= share)) for share in (CONTACT if touched else ARRIVED, ARRIVED))
     if touched:
         _check_way(tip, thing, way, start, end)
         x, object_ = _push(x, way, scene, warnings)
-        i, j = int(np.argmax(way >= CONTACT)), int(np.argmax(way >= ARRIVED))
     else:
-        object_, i, j = None, int(np.argmax(way >= ARRIVED)), int(np.argmax(way >= ARRIVED))
+        object_ = None
         x[j:] = x[j]
         _check_reach(x, scene)
     first, last = _first_step(x, i, scene), j + 1 + round(REST * FPS)

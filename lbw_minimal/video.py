@@ -61,7 +61,7 @@ def read(path: Path | str, whole: bool = False) -> tuple[np.ndarray, list[str]]:
         raise InputError(
             f"{path}: nothing moves in the video; give one in which the arm does the task."
         )
-    if _steadiness(still, background) < STEADY:
+    if steadiness(still, background) < STEADY:
         warnings.append("the camera seems to move; put it on a stand, or keypoints will follow it.")
     return frames, [f"{path}: {warning}" for warning in warnings]
 
@@ -79,7 +79,7 @@ def _square(rgb, path):
     return cv2.resize(square, (SIZE, SIZE), interpolation=cv2.INTER_AREA)
 
 
-def _steadiness(still, background):
+def steadiness(still: np.ndarray, background: np.ndarray) -> float:
     """Share of the frames in which the steadiest two fifths of the edges stay within a pixel.
 
     An edge of slope g that moves by d pixels changes the grey level there by g d. The arm hides
@@ -94,7 +94,7 @@ def _steadiness(still, background):
     if not edge.any():
         return 1.0
     stays = np.abs(still - background)[:, edge] < slope[edge]  # (frames, edge pixels)
-    return np.percentile(stays.mean(axis=0), 60)
+    return float(np.percentile(stays.mean(axis=0), 60))
 
 
 def write(path: Path | str, frames: Iterable[np.ndarray], fps: float, scale: int = 2) -> None:
