@@ -58,7 +58,9 @@ def main(argv: list[str]) -> None:
     torch.set_num_threads(1)  # the network is small: a second thread costs more than it gains
     if args.measure:
         model = Detector.load(weights)
-        metrics = json.loads(metrics_file.read_text()) if metrics_file.exists() else {}
+        metrics = (
+            json.loads(metrics_file.read_text(encoding="utf-8")) if metrics_file.exists() else {}
+        )
     else:
         make_folder(args.out)
         metrics = learn(args.iterations, args.seed, weights)
@@ -96,7 +98,7 @@ def measure(model: Detector, clips: Path | None = None) -> dict[str, dict]:
     for task in tasks.TASKS:
         out[f"{task}'s videos"] = compare(filmed(model, task))
     if clips:
-        for name, told in json.loads(MARKS.read_text())["clips"].items():
+        for name, told in json.loads(MARKS.read_text(encoding="utf-8"))["clips"].items():
             out[name] = compare([marked(model, clips / name, told)])
     return out
 
