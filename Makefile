@@ -11,7 +11,7 @@ LOCK ?= -c requirements-lock.txt
 TORCH_INDEX ?=
 PIP = $(BIN)/python -m pip install --disable-pip-version-check
 
-.PHONY: push reach test slow peers cluster bench lab notebooks book builds resolve lock clean
+.PHONY: push reach test slow peers cluster mutants bench lab notebooks book builds resolve lock clean
 
 push reach: $(VENV)/ready
 	$(BIN)/python -m tasks $@
@@ -33,6 +33,11 @@ cluster: $(VENV)/ready
 	@echo "Ray: 80 MB to download."
 	$(PIP) -q -r requirements-cluster.txt
 	$(BIN)/python -m pytest -q tests/test_cluster.py
+
+# Faults put in on purpose, one at a time, 500 of them: hours.
+mutants: $(VENV)/ready
+	$(PIP) -q -r requirements-mutants.txt
+	$(BIN)/python -m tests.mutants
 
 bench: $(VENV)/ready
 	$(BIN)/python -m tasks bench
