@@ -77,7 +77,7 @@ def test_a_browser_records_what_its_camera_sees(tmp_path):
     )
     camera = ("--use-fake-device-for-media-stream", "--use-fake-ui-for-media-stream",
               f"--use-file-for-fake-video-capture={tmp_path / 'camera.y4m'}")  # fmt: skip
-    state, click = "document.body.dataset.state", "document.getElementById('{}').click()"
+    state, click = "document.body?.dataset.state", "document.getElementById('{}').click()"
     read = """fetch(document.getElementById("save").href).then(r => r.blob()).then(blob =>
         new Promise(done => {
             const reader = new FileReader();

@@ -128,8 +128,9 @@ def check(name: str, args: argparse.Namespace, argv: list[str]) -> Job:
 
     clip = usable(name, args.video) if args.video and not args.translate_clip else None
     experts = [clip.film] if clip else [read_video(path) for path in videos(name, args)]
-    random = experts[0][:0]
-    if not args.translate_clip:
+    if args.translate_clip:  # the clip alone is the human domain
+        random = experts[0][:0]
+    else:
         random = read_video(tasks.VIDEOS / name / "random.mp4", whole=True)
     if lbw:  # whose demonstration is one: the translation sees the others beside random motion
         random = np.concatenate([random, *experts[1:]])
