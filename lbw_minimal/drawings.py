@@ -128,7 +128,7 @@ def _room(rng, story):
         corners = [(left, top - tilt), (right, top + tilt), (right + wide, bottom),
                    (left - wide, bottom)]  # fmt: skip
         layer = draw.empty() + np.array([*a_colour(rng), 255]).astype(np.uint8)
-        _clutter(rng, layer, rng.integers(0, 4), (0, max(top, 0)), (SIZE, SIZE))
+        _clutter(rng, layer, rng.integers(0, 4), (0, np.clip(top, 0, SIZE)), (SIZE, SIZE))
         wood = layer[..., :3] * a_surface(rng, rng.uniform(0, 0.08))
         table = draw.empty()
         draw.polygon(table, np.array(corners), np.zeros(3))
