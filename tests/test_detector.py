@@ -322,7 +322,7 @@ def test_weights_are_small():
     assert (WEIGHTS / "eyes" / "eyes.safetensors").stat().st_size < 1_000_000
 
 
-def test_shipped_weights_find_what_they_state_on_drawings_held_out(shipped, stated):
+def test_shipped_weights_find_tip_and_object_in_drawings_held_out(shipped):
     errors = {"tip": [], "object": []}
     for i in range(40):
         clip = draw_clip(np.random.default_rng([1_000_000, i]))
@@ -332,7 +332,7 @@ def test_shipped_weights_find_what_they_state_on_drawings_held_out(shipped, stat
             e = np.linalg.norm(getattr(found, what) - getattr(clip, what), axis=1)[sure]
             kept.append(e[np.isfinite(e)])
     for what, kept in errors.items():
-        assert np.median(np.concatenate(kept)) < 1.3 * stated["drawings"][what]["px"]
+        assert np.median(np.concatenate(kept)) < 4, what  # pixels of 84
 
 
 def test_shipped_weights_find_tip_and_object_in_a_human_video(shipped, stated):
@@ -346,4 +346,4 @@ def test_shipped_weights_find_tip_and_object_in_a_human_video(shipped, stated):
         error = np.linalg.norm(getattr(found, what) - truth, axis=1)[sure]
         figures = stated["push's videos"][what]
         assert sure.mean() > 0.8 * figures["found"]
-        assert np.median(error) < 1.3 * figures["p90"]
+        assert np.median(error) < min(4, 1.3 * figures["p90"])
