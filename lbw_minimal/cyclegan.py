@@ -25,7 +25,7 @@ from torch import nn
 
 from lbw_minimal import gan
 from lbw_minimal.gan import LOG_EVERY, MOTION_GAN, MOTION_L1, Critics, Losses, l1, least_squares
-from lbw_minimal.images import motion_weight
+from lbw_minimal.images import motion_weight, spread
 from lbw_minimal.munit_networks import ContentEncoder, Critic, adain, bfloat16
 from lbw_minimal.training import Checkpoint, pick_device, progress, seed_everything
 
@@ -232,7 +232,7 @@ def translate(model: CycleGAN, frames: np.ndarray) -> np.ndarray:
 
 def mean_images(model: CycleGAN, human: np.ndarray, robot: np.ndarray) -> dict[str, np.ndarray]:
     """Mean frames (84, 84, 3) in 0-255 of the domains, "x" and "y", and of their translations."""
-    human, robot = gan.spread(human, 32), gan.spread(robot, 32)
+    human, robot = spread(human, 32), spread(robot, 32)
     x_of_y = gan.repaint(robot, model.x_of_y, next(model.parameters()).device)
     y_of_x = translate(model, human)
     named = {"x": human, "x_of_y": x_of_y, "y": robot, "y_of_x": y_of_x}

@@ -13,7 +13,7 @@ from itertools import pairwise
 import cv2
 import numpy as np
 
-from lbw_minimal.motion import MOVED, SMALL, differs, high_pass, small, some
+from lbw_minimal.motion import MOVED, SMALL, before_background
 from lbw_minimal.paths import Unusable
 from lbw_minimal.video import STEADY, steadiness
 
@@ -32,9 +32,8 @@ def check(frames: np.ndarray, cuts: Sequence[int] = ()) -> list[str]:
     """
     edges = [0, *cuts, len(frames)]
     first, last = max(pairwise(edges), key=lambda shot: shot[1] - shot[0])
-    still = high_pass(np.stack([small(frame) for frame in some(frames[first:last])]))
-    background = np.median(still, axis=0)  # (84, 84)
-    if not differs(still, background).any():
+    still, background, moving = before_background(frames[first:last])
+    if not moving:
         raise Unusable("nothing moves in the clip", "film an arm that does the task")
     steady = steadiness(still, background)
     if steady < SHAKEN:

@@ -66,11 +66,6 @@ def draw(
     return to_images(frames[rng.integers(len(frames), size=n)], device)
 
 
-def spread(frames: np.ndarray, n: int) -> np.ndarray:
-    """Up to n of the frames, evenly over the video."""
-    return frames[np.linspace(0, len(frames) - 1, min(n, len(frames))).astype(int)]
-
-
 def median_image(frames: np.ndarray, device: torch.device) -> torch.Tensor:
     """The median frame as an image (1, 3, 84, 84)."""
     # in whole grey levels, as when the shipped weights were trained

@@ -21,6 +21,11 @@ def to_frames(images: torch.Tensor) -> np.ndarray:
     return grey.permute(0, 2, 3, 1).cpu().numpy()
 
 
+def spread(frames: np.ndarray, n: int) -> np.ndarray:
+    """Up to n of the frames (T, ...), evenly over the video."""
+    return frames[np.linspace(0, len(frames) - 1, min(n, len(frames))).astype(int)]
+
+
 def median_frame(frames: np.ndarray) -> np.ndarray:
     """The frame (1, H, W, 3) float in 0-255 that holds each pixel's median over (T, H, W, 3)."""
     return np.median(frames, axis=0, keepdims=True)

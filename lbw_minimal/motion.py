@@ -12,6 +12,8 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
+from lbw_minimal.images import spread
+
 SMALL = 84  # pixels, both sides of a frame when it is asked whether something moves
 LOOK_AT = 60  # frames that are looked at for this, spread over the film
 # Grey levels, after the local mean is taken off. Sensor noise of 16 levels moves 0.04 % of a
@@ -34,7 +36,7 @@ GAP = 0.5  # seconds: a longer pause between two frames hides a motion
 
 def some(frames: np.ndarray) -> np.ndarray:
     """At most LOOK_AT of the frames (T, ...), spread evenly."""
-    return frames[np.linspace(0, len(frames) - 1, min(len(frames), LOOK_AT)).astype(int)]
+    return spread(frames, LOOK_AT)
 
 
 def high_pass(frames: np.ndarray) -> np.ndarray:
@@ -54,10 +56,17 @@ def differs(still: np.ndarray, other: np.ndarray) -> np.ndarray:
     return (np.abs(still - other) > MOVED).mean(axis=(-2, -1)) >= MOVED_SHARE
 
 
+def before_background(frames: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
+    """Some of the frames (T, H, W, 3) uint8, high-passed, (n, 84, 84), their background, (84, 84),
+    and whether anything moves in front of it."""
+    still = high_pass(np.stack([small(frame) for frame in some(frames)]))
+    background = np.median(still, axis=0)
+    return still, background, bool(differs(still, background).any())
+
+
 def moves(frames: np.ndarray) -> bool:
     """Whether anything moves in frames (T, H, W, 3) uint8."""
-    still = high_pass(np.stack([small(frame) for frame in some(frames)]))
-    return bool(differs(still, np.median(still, axis=0)).any())
+    return before_background(frames)[2]
 
 
 def jumps(frames: np.ndarray, times: np.ndarray) -> list[int]:

@@ -22,7 +22,7 @@ from torch import nn
 
 from lbw_minimal import gan
 from lbw_minimal.gan import LOG_EVERY, MOTION_GAN, MOTION_L1, Critics, Losses, l1, least_squares
-from lbw_minimal.images import motion_weight, to_images
+from lbw_minimal.images import motion_weight, spread, to_images
 from lbw_minimal.munit_networks import MUNIT, Critic, bfloat16
 from lbw_minimal.training import Checkpoint, pick_device, progress, seed_everything
 
@@ -175,7 +175,7 @@ def train(
 def robot_style(model: MUNIT, robot_frames: np.ndarray) -> torch.Tensor:
     """Mean style code (style_dim,) of up to 64 of the real robot frames (T, 84, 84, 3) uint8."""
     device = next(model.parameters()).device
-    return model.style(to_images(gan.spread(robot_frames, 64), device), "y").mean(0)
+    return model.style(to_images(spread(robot_frames, 64), device), "y").mean(0)
 
 
 def translate(model: MUNIT, frames: np.ndarray, robot_style: torch.Tensor) -> np.ndarray:
@@ -201,7 +201,7 @@ def mean_images(model: MUNIT, human: np.ndarray, robot: np.ndarray) -> dict[str,
 
     "x_of_y" is what the robot's frames look like in the human domain, "y_of_x" the other way round.
     """
-    human, robot = gan.spread(human, 32), gan.spread(robot, 32)
+    human, robot = spread(human, 32), spread(robot, 32)
     s_x = model.style(to_images(human, next(model.parameters()).device), "x").mean(0)
     x_of_y = _decoded(model, robot, s_x, "y", "x")
     y_of_x = translate(model, human, robot_style(model, robot))

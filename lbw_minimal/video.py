@@ -20,7 +20,7 @@ import cv2
 import numpy as np
 
 from lbw_minimal.clip import read_clip, resample, steady
-from lbw_minimal.motion import differs, high_pass, some
+from lbw_minimal.motion import before_background
 from lbw_minimal.training import InputError, write_atomic
 
 SIZE = 84  # pixels, both sides of a frame
@@ -55,9 +55,8 @@ def read(path: Path | str, whole: bool = False) -> tuple[np.ndarray, list[str]]:
         every = -(-len(frames) // MAX_FRAMES)
         count, frames = len(frames), frames[::every]
         warnings.append(f"{count} frames are many; every {every}th is used, {len(frames)} in all.")
-    still = high_pass(some(frames))
-    background = np.median(still, axis=0)  # (84, 84)
-    if not differs(still, background).any():
+    still, background, moving = before_background(frames)
+    if not moving:
         raise InputError(
             f"{path}: nothing moves in the video; give one in which the arm does the task."
         )

@@ -59,7 +59,15 @@ WORLD = tuple(
 SLACK = 5  # times as long as without a fault, and the tests hang
 
 
-class ScaleFloat(Operator):
+class Ours(Operator):
+    """An operator without the examples that Cosmic Ray asks of its own."""
+
+    @classmethod
+    def examples(cls):
+        return ()
+
+
+class ScaleFloat(Ours):
     """0.1 -> 0.2, and 0.1 -> 0.05: Cosmic Ray adds and takes away 1, which nobody would do here."""
 
     def mutation_positions(self, node):
@@ -70,12 +78,8 @@ class ScaleFloat(Operator):
         value = ast.literal_eval(node.value) * (2.0, 0.5)[index]
         return parso.python.tree.Number(repr(value), node.start_pos, node.prefix)
 
-    @classmethod
-    def examples(cls):
-        return ()
 
-
-class SwapArguments(Operator):
+class SwapArguments(Ours):
     """f(a, b, ...) -> f(b, a, ...)"""
 
     def mutation_positions(self, node):
@@ -96,12 +100,8 @@ class SwapArguments(Operator):
             node.children[i] = parso.python.tree.Name(code, (1, 0), prefix)
         return node
 
-    @classmethod
-    def examples(cls):
-        return ()
 
-
-class LeaveOutStep(Operator):
+class LeaveOutStep(Ours):
     """optimizer.step() -> None"""
 
     def mutation_positions(self, node):
@@ -114,12 +114,8 @@ class LeaveOutStep(Operator):
         )
         return node
 
-    @classmethod
-    def examples(cls):
-        return ()
 
-
-class PassOn(Operator):
+class PassOn(Ours):
     """np.clip(x, low, high) -> x, and x.detach() -> x"""
 
     ON_FIRST = re.compile(r"(np|torch|F)\.\w+$|min$|max$|abs$|round$|float$|int$")
@@ -145,10 +141,6 @@ class PassOn(Operator):
     def mutate(self, node, index):
         prefix = node.get_first_leaf().prefix
         return parso.python.tree.Name(self._kept(node), node.start_pos, prefix)
-
-    @classmethod
-    def examples(cls):
-        return ()
 
 
 def _operators() -> dict[str, Operator]:

@@ -231,21 +231,23 @@ def test_running_normalisation_is_that_of_all_observations():
 # The loop -----------------------------------------------------------------------------------------
 
 
-def test_the_time_limit_is_not_stored_as_the_end(monkeypatch):
-    buffers = []
+@pytest.fixture
+def buffers(monkeypatch):
+    """The replay buffers of trainings to come."""
+    made = []
     monkeypatch.setattr(
-        module, "ReplayBuffer", lambda *a: buffers.append(ReplayBuffer(*a)) or buffers[-1]
+        module, "ReplayBuffer", lambda *a: made.append(ReplayBuffer(*a)) or made[-1]
     )
+    return made
+
+
+def test_the_time_limit_is_not_stored_as_the_end(buffers):
     train(Walk(), steps=60, seed=0, random_steps=100, width=8)
     assert len(buffers[0]) == 60 and (buffers[0].data["terminal"] == 0).all()
 
 
-def test_a_transition_is_kept_as_it_happened(monkeypatch):
+def test_a_transition_is_kept_as_it_happened(buffers):
     """s, a, r and s' of a walk whose laws are known; within an episode s' is the next s."""
-    buffers = []
-    monkeypatch.setattr(
-        module, "ReplayBuffer", lambda *a: buffers.append(ReplayBuffer(*a)) or buffers[-1]
-    )
     train(Walk(), steps=60, seed=0, random_steps=30, width=8, batch=8)
     obs, action, reward, next_obs, _ = (
         buffers[0].data[k][:60] for k in ("obs", "action", "reward", "next_obs", "terminal")

@@ -117,15 +117,23 @@ def at_least(least: int) -> Callable[[str], int]:
     return number
 
 
-def metres(text: str) -> float:
-    """A type for argparse: how far a start may be moved, in m."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0 <= value <= MOST_JITTER:
-        raise argparse.ArgumentTypeError(f"{text!r} is no length from 0 to {MOST_JITTER} m")
-    return value
+def within(low: float, high: float, what: str) -> Callable[[str], float]:
+    """A type for argparse: a number from `low` to `high`, which is `what`."""
+
+    def number(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not low <= value <= high:
+            raise argparse.ArgumentTypeError(f"{text!r} is no {what}")
+        return value
+
+    return number
+
+
+# a type for argparse: how far a start may be moved
+metres = within(0, MOST_JITTER, f"length from 0 to {MOST_JITTER} m")
 
 
 def make_folder(out: Path) -> None:

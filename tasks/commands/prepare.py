@@ -8,14 +8,13 @@ the simulated human in front of the kit's own camera.
 from __future__ import annotations
 
 import argparse
-import math
 import shlex
 import sys
 import tempfile
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
-import cv2
 import numpy as np
 
 import tasks
@@ -23,11 +22,12 @@ from lbw_minimal import footage, imitate, video
 from lbw_minimal.clip import Clip, read_clip
 from lbw_minimal.clip_page import write_page
 from lbw_minimal.detector import Detector, Found, refine
+from lbw_minimal.motion import small
 from lbw_minimal.paths import Tracks, Unusable
 from lbw_minimal.pictures import spread
 from lbw_minimal.retarget import FPS, Motion, Scene, lay
 from lbw_minimal.training import InputError, write_atomic
-from tasks.commands import Parser, make_folder
+from tasks.commands import Parser, make_folder, within
 from tasks.world.reenact import Reenactment, reenact
 
 FILM, PAGE = "reenactment.mp4", "prepare.html"
@@ -99,35 +99,15 @@ def parser() -> Parser:
     )
     add("--to", type=seconds, dest="last", metavar="S", help="and after")
     add("--mirror", action=argparse.BooleanOptionalAction, help="left for right (as it goes)")
-    add(
-        "--tip",
-        type=mark,
-        action="append",
-        default=[],
-        metavar="X,Y@S",
-        help=f"where the tip is: {WHERE}",
-    )
-    add(
-        "--object",
-        type=mark,
-        action="append",
-        default=[],
-        metavar="X,Y@S",
-        help=f"and the object: {WHERE}",
-    )
+    marks: Any = {"type": mark, "action": "append", "default": [], "metavar": "X,Y@S"}
+    add("--tip", **marks, help=f"where the tip is: {WHERE}")
+    add("--object", **marks, help=f"and the object: {WHERE}")
     add("--out", type=Path, metavar="DIR", help="its folder (runs/prepare/TASK)")
     return p
 
 
-def seconds(text: str) -> float:
-    """A type for argparse: a time in a clip, in s."""
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not 0 <= value < math.inf:
-        raise argparse.ArgumentTypeError(f"{text!r} is no time in seconds from 0 on")
-    return value
+# a type for argparse
+seconds = within(0, sys.float_info.max, "time in seconds from 0 on")
 
 
 def mark(text: str) -> Mark:
@@ -260,13 +240,8 @@ def is_own(clip: Clip, first: np.ndarray) -> bool:
     h, w = clip.frames.shape[1:3]
     if h != w or np.median(np.diff(clip.times)) > OWN_STEP:
         return False
-    off = np.abs(square(clip.frames[0]).astype(int) - first)
+    off = np.abs(small(clip.frames[0]).astype(int) - first)
     return bool(np.percentile(off, 99) < OWN)
-
-
-def square(frame: np.ndarray) -> np.ndarray:
-    """A square frame of any size as one of (84, 84, 3)."""
-    return cv2.resize(frame, (video.SIZE, video.SIZE), interpolation=cv2.INTER_AREA)
 
 
 def take_as_it_is(result: Prepared) -> None:
@@ -274,7 +249,7 @@ def take_as_it_is(result: Prepared) -> None:
     times = result.clip.times
     t = np.arange(times[0], times[-1] + 0.5 / FPS, 1 / FPS)
     nearest = np.abs(times[None] - t[:, None]).argmin(axis=1)
-    keep(result, np.stack([square(result.clip.frames[i]) for i in nearest]))
+    keep(result, np.stack([small(result.clip.frames[i]) for i in nearest]))
     result.notes.append("It was filmed by the kit's own camera, and is taken as it is.")
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 from tests.grade.cell.answer import STUB
 from tests.grade.exercise import everything
 from tests.grade.files import (
+    KIT,
     NOTEBOOK,
     RELEASED,
     File,
@@ -79,7 +80,7 @@ def submissions(folder: Path, out: Path) -> list[Submission]:
 def is_one(folder: Path) -> bool:
     """Whether a folder is one student's: a copy of the kit, or notebooks with names of the course
     and others beside them that do not answer the same. A folder of folders is a class."""
-    if (folder / "lbw_minimal").is_dir() and (folder / "notebooks").is_dir():
+    if all((folder / name).is_dir() for name in KIT):
         return True
     found, notes = notebooks(folder, "")
     if notes or any("/" in name for _, name in found):
