@@ -46,10 +46,10 @@ def classifier_reward(
 
     random (T, 84, 84, 3) uint8: further frames of the robot that show no goal, or none of them, as
     in the paper. Returns the policy and `env` wrapped so that its observations are the policy's.
-    device: where the classifier learns.
+    device: where all networks learn.
     """
     model = learn_goals(videos, random, recipe, task=task, seed=seed, run=run, device=device)
-    return learn_from_pixels(env, model, recipe, seed=seed, run=run)
+    return learn_from_pixels(env, model, recipe, seed=seed, run=run, device=device)
 
 
 def avid_m(
@@ -76,7 +76,7 @@ def avid_m(
     translated = [cyclegan.translate(G, video) for video in experts]
     others = cyclegan.translate(G, random) if recipe.random_negatives else random[:0]
     model = learn_goals(translated, others, recipe, task=task, seed=seed, run=run, device=device)
-    return learn_from_pixels(env, model, recipe, seed=seed, run=run)
+    return learn_from_pixels(env, model, recipe, seed=seed, run=run, device=device)
 
 
 def learn_translation(
@@ -158,6 +158,7 @@ def learn_from_pixels(
     *,
     seed: int,
     run: Run,
+    device: str = "cpu",
 ) -> tuple[Policy, gym.Env]:
     """SAC+AE on the classifier's reward."""
     env = watched(env, model, recipe.clip)
@@ -166,7 +167,8 @@ def learn_from_pixels(
         with run.stage("policy") as checkpoint:
             agent, log = sac_ae.train(
                 env, steps=recipe.policy_steps, updates=recipe.pixel_updates,
-                hold=recipe.hold, entropy=recipe.entropy, seed=seed, checkpoint=checkpoint,
+                hold=recipe.hold, entropy=recipe.entropy, seed=seed, device=device,
+                checkpoint=checkpoint,
             )  # fmt: skip
             run.log("policy_log", log)
             sac_ae.save(path, agent)

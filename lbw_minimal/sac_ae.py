@@ -32,7 +32,14 @@ from lbw_minimal.sac_ae_networks import (
     PixelCritic,
 )
 from lbw_minimal.sac_networks import Policy, draw, length
-from lbw_minimal.training import Checkpoint, InputError, load_state, save_state, seed_everything
+from lbw_minimal.training import (
+    Checkpoint,
+    InputError,
+    load_state,
+    pick_device,
+    save_state,
+    seed_everything,
+)
 
 # The publication's: of the latents' mean square length, and of the decoder's weights.
 LATENT_L2, DECODER_DECAY = 1e-6, 1e-7
@@ -43,7 +50,7 @@ class SACAE(SAC):
     """Encoder, decoder, actor, twin critics and temperature with their optimizers.
 
     size: "slim", or "published" at 24 times the cost. tau_encoder: pace of the target's encoder.
-    The other arguments are those of `SAC`.
+    device: where the networks are. The other arguments are those of `SAC`.
     """
 
     normalise: Patches
@@ -64,15 +71,17 @@ class SACAE(SAC):
         alpha: float = 0.02,
         average: float = 0.005,
         entropy: float = -1.0,
+        device: str = "cpu",
     ):
         self.gamma, self.tau, self.tau_encoder, self.average = gamma, tau, tau_encoder, average
-        self.size, self.updates = SIZES[size], 0
+        self.size, self.updates, self.device = SIZES[size], 0, pick_device(device)
         self.normalise = Patches(self.size.patch)
-        self.encoder = Encoder(self.size)
-        self.decoder = Decoder(self.size)
-        self.actor = PixelActor(self.encoder, action_dim, size)
-        self.critic = PixelCritic(self.encoder, action_dim, self.size)
-        self._set_up(alpha, entropy)
+        with self.device:
+            self.encoder = Encoder(self.size)
+            self.decoder = Decoder(self.size)
+            self.actor = PixelActor(self.encoder, action_dim, size)
+            self.critic = PixelCritic(self.encoder, action_dim, self.size)
+            self._set_up(alpha, entropy)
         self._of_actor = [*self.actor.net.parameters(), self.log_alpha]
         groups = [
             {"params": list(self.critic.parameters()), "lr": critic_lr},
@@ -102,6 +111,7 @@ class SACAE(SAC):
         The decoder learns every `size.decode_every` updates. Returns what the log is told.
         """
         self.updates += 1
+        batch = {name: tensor.to(self.device) for name, tensor in batch.items()}
         x, y = self.normalise(batch["obs"]), self.critic_target(batch)
         h = self.encoder(x)
         critic_loss = (self.critic.head(h, batch["action"]) - y).square().mean(1).sum()

@@ -96,9 +96,10 @@ class Policy:
     @torch.no_grad()
     def act(self, obs: np.ndarray, deterministic: bool = False) -> np.ndarray:
         """Action (A,) float32 in [-1, 1] for an observation: a sample, or the mean."""
-        s = self.normalise(torch.as_tensor(obs, dtype=torch.float32))
+        device = next(self.actor.parameters()).device
+        s = self.normalise(torch.as_tensor(obs, dtype=torch.float32, device=device))
         a = torch.tanh(self.actor(s)[0]) if deterministic else self.actor.sample(s)[0]
-        return a.numpy()
+        return a.cpu().numpy()
 
 
 class TwinCritic(nn.Module):

@@ -85,7 +85,7 @@ def parser(name: str) -> Parser:
     add("--jitter", type=metres, default=JITTER, metavar="M", help="how far starts are moved")
     add("--episodes", type=at_least(1), default=None, help=f"test episodes ({TEST_EPISODES})")
     add("--seed", type=at_least(0), default=0)
-    add("--device", help="where perception learns: cpu (the default) or cuda")
+    add("--device", help="where perception, or a rival, learns: cpu (the default) or cuda")
     add("--threads", type=at_least(1), help="torch's threads (all cores)")
     add("--fast", action="store_true", help="a smoke run through every stage")
     add("--resume", action="store_true", help="go on with the run in --out")
