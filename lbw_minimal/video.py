@@ -1,6 +1,6 @@
 """Video files, in and out.
 
-In: any file that `clip.py` reads, of any size and frame rate. Out: frames (T, 84, 84, 3) uint8 RGB,
+In: any file that `clips` reads, of any size and frame rate. Out: frames (T, 84, 84, 3) uint8 RGB,
 25 a second, checked before anything is learnt from them. The other way round, frames become a film
 that a browser plays. Pauses are not cut here but on the keypoint trajectory, where stillness does
 not depend on light and noise.
@@ -19,8 +19,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from lbw_minimal.clip import read_clip, resample, steady
-from lbw_minimal.motion import before_background
+from lbw_minimal.clips.motion import before_background
+from lbw_minimal.clips.reader import read_clip, resample, steady
 from lbw_minimal.training import InputError, write_atomic
 
 SIZE = 84  # pixels, both sides of a frame

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from toy_clips import H, W, add, arm, encode, reach, room, shows
 
-from lbw_minimal import clip as clips
-from lbw_minimal.clip import read_clip, resample, steady
+from lbw_minimal.clips import reader as clips
+from lbw_minimal.clips.reader import read_clip, resample, steady
 from lbw_minimal.training import InputError
 
 KINDS = {
@@ -276,7 +276,7 @@ def test_4k_needs_little_memory(tmp_path):
     large = (cv2.resize(f, (3840, 2160), interpolation=cv2.INTER_NEAREST) for f in [reach(1)[0]])
     path = encode(tmp_path / "a.mp4", [*large] * 60, options={"preset": "ultrafast"})
     code = (
-        "import sys; from lbw_minimal.clip import read_clip; read_clip(sys.argv[1]);"
+        "import sys; from lbw_minimal.clips.reader import read_clip; read_clip(sys.argv[1]);"
         # not getrusage's, in which the process that started this one counts, too
         "print(open('/proc/self/status').read().split('VmHWM:')[1].split()[0])"
     )

@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 from toy_clips import add, add_sound, encode, reach, room
 
-from lbw_minimal.clip import read_clip
+from lbw_minimal.clips.reader import read_clip
 from lbw_minimal.training import InputError
 
 

@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 import torch
 
-from lbw_minimal import corners, detector, drawings, video
-from lbw_minimal.detector import Detector, Found, refine
-from lbw_minimal.detector_networks import CELLS, Network, both_ways, loss, read, target
-from lbw_minimal.drawings import STORIES, Clip, draw_clip
+from lbw_minimal import video
+from lbw_minimal.clips import corners, detector, drawings
+from lbw_minimal.clips.detector import Detector, Found, refine
+from lbw_minimal.clips.detector_networks import CELLS, Network, both_ways, loss, read, target
+from lbw_minimal.clips.drawings import STORIES, Clip, draw_clip
 from lbw_minimal.images import to_images
 from lbw_minimal.training import Checkpoint, InputError
 from tasks import VIDEOS, WEIGHTS, bare

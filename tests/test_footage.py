@@ -4,8 +4,9 @@ import cv2
 import numpy as np
 import pytest
 
-from lbw_minimal import footage, video
-from lbw_minimal.paths import Unusable
+from lbw_minimal import video
+from lbw_minimal.clips import footage
+from lbw_minimal.clips.paths import Unusable
 from tasks import TASKS, VIDEOS
 
 SIZE = 120, 160  # pixels, height and width

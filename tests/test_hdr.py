@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from toy_clips import encode
 
-from lbw_minimal import hdr
-from lbw_minimal.clip import read_clip
+from lbw_minimal.clips import hdr
+from lbw_minimal.clips.reader import read_clip
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from packaging.requirements import Requirement
 from lbw_minimal import __version__
 
 ROOT = Path(__file__).resolve().parent.parent
-PACKAGE = sorted((ROOT / "lbw_minimal").glob("*.py"))
+PACKAGE = sorted((ROOT / "lbw_minimal").rglob("*.py"))
 CODE = [*PACKAGE, *sorted((ROOT / "tasks").rglob("*.py"))]
 FILE = 330  # lines, one sitting
 FUNCTION = 60  # lines, a screen

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from lbw_minimal import video
-from lbw_minimal.clip import read_clip
-from lbw_minimal.clip_page import write_page
-from lbw_minimal.detector import Found
-from lbw_minimal.paths import Unusable
+from lbw_minimal.clips.detector import Found
+from lbw_minimal.clips.page import write_page
+from lbw_minimal.clips.paths import Unusable
+from lbw_minimal.clips.reader import read_clip
 from lbw_minimal.training import InputError
 from tasks import VIDEOS, bare
 from tasks.__main__ import main

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from toy_pushes import seen
 
-from lbw_minimal.paths import Unusable, interpolate
-from lbw_minimal.retarget import lay
+from lbw_minimal.clips.paths import Unusable, interpolate
+from lbw_minimal.clips.retarget import lay
 from tasks import TASKS, bare
 from tasks.world import record_expert
 from tasks.world.reenact import reenact

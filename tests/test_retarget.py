@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from toy_pushes import CAMERA, HIT, SCENE, SIDE, at, clip, hit, jerk, push, seen
 
-from lbw_minimal.paths import LEAST_FRAMES, Unusable, low_pass, progress
-from lbw_minimal.retarget import APPROACH, FPS, HURRY, apply, lay
+from lbw_minimal.clips.paths import LEAST_FRAMES, Unusable, low_pass, progress
+from lbw_minimal.clips.retarget import APPROACH, FPS, HURRY, apply, lay
 
 PUSHING = np.linspace(1.35, 1.9, 20)  # s, after 12 % of the way and before it is done
 TILTED = np.array([[900.0, 120.0, -300.0], [90.0, -900.0, 300.0]])  # by 6 and 8 degrees

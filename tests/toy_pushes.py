@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from lbw_minimal.paths import Tracks, interpolate
-from lbw_minimal.retarget import Scene
+from lbw_minimal.clips.paths import Tracks, interpolate
+from lbw_minimal.clips.retarget import Scene
 
 SCENE = Scene(
     start=(0.50, 0.025), goal=(0.65, 0.025), tip=(0.45, 0.12), low=(0.42, 0.015),

@@ -18,9 +18,10 @@ import numpy as np
 import torch
 
 import tasks
-from lbw_minimal import detector, video
-from lbw_minimal.detector import SURE, Detector, Found
-from lbw_minimal.drawings import SIZE, draw_clip
+from lbw_minimal import video
+from lbw_minimal.clips import detector
+from lbw_minimal.clips.detector import SURE, Detector, Found
+from lbw_minimal.clips.drawings import SIZE, draw_clip
 from lbw_minimal.training import Checkpoint, InputError, write_atomic
 from tasks.commands import Parser, at_least, make_folder
 from tasks.world import load_recordings

@@ -18,14 +18,15 @@ from typing import Any
 import numpy as np
 
 import tasks
-from lbw_minimal import footage, imitate, video
-from lbw_minimal.clip import Clip, read_clip
-from lbw_minimal.clip_page import write_page
-from lbw_minimal.detector import Detector, Found, refine
-from lbw_minimal.motion import small
-from lbw_minimal.paths import Tracks, Unusable
+from lbw_minimal import imitate, video
+from lbw_minimal.clips import footage
+from lbw_minimal.clips.detector import Detector, Found, refine
+from lbw_minimal.clips.motion import small
+from lbw_minimal.clips.page import write_page
+from lbw_minimal.clips.paths import Tracks, Unusable
+from lbw_minimal.clips.reader import Clip, read_clip
+from lbw_minimal.clips.retarget import FPS, Motion, Scene, lay
 from lbw_minimal.pictures import spread
-from lbw_minimal.retarget import FPS, Motion, Scene, lay
 from lbw_minimal.training import InputError, write_atomic
 from tasks.commands import Parser, make_folder, within
 from tasks.world.reenact import Reenactment, reenact

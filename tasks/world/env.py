@@ -13,7 +13,7 @@ import numpy as np
 from gymnasium.error import ClosedEnvironmentError, InvalidAction, ResetNeeded, UnsupportedMode
 from gymnasium.utils import EzPickle
 
-from lbw_minimal.retarget import Scene
+from lbw_minimal.clips.retarget import Scene
 from tasks.world.arm import KP, Arm
 from tasks.world.scene import FINGER, LOOKS, SIZE, SUBSTEPS, World
 

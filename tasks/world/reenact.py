@@ -14,8 +14,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from lbw_minimal.paths import Unusable
-from lbw_minimal.retarget import FPS, Motion, stretched
+from lbw_minimal.clips.paths import Unusable
+from lbw_minimal.clips.retarget import FPS, Motion, stretched
 from tasks.world.env import TaskEnv
 from tasks.world.recording import Recording, film
 

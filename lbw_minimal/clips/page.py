@@ -16,7 +16,8 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from lbw_minimal.paths import SURE, Tracks
+from lbw_minimal.clips.paths import SURE, Tracks
+from lbw_minimal.clips.retarget import FPS, Motion, Scene
 from lbw_minimal.pictures import (
     COLOURS,
     STYLE,
@@ -30,7 +31,6 @@ from lbw_minimal.pictures import (
 )
 from lbw_minimal.report import section, table
 from lbw_minimal.report_texts import CSS, HTML
-from lbw_minimal.retarget import FPS, Motion, Scene
 from lbw_minimal.training import write_atomic
 
 SCALE = 3  # of the film's pictures, 84 pixels wide

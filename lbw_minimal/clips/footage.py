@@ -13,8 +13,8 @@ from itertools import pairwise
 import cv2
 import numpy as np
 
-from lbw_minimal.motion import MOVED, SMALL, before_background
-from lbw_minimal.paths import Unusable
+from lbw_minimal.clips.motion import MOVED, SMALL, before_background
+from lbw_minimal.clips.paths import Unusable
 from lbw_minimal.video import STEADY, steadiness
 
 SHAKEN = 0.80  # steadiness of a drawn room that is panned by 10 of 84 pixels; STEADY is a warning

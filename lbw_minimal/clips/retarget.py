@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from lbw_minimal.paths import (
+from lbw_minimal.clips.paths import (
     FOUND,
     LEAST_WAY,
     REST,

@@ -16,10 +16,10 @@ from pathlib import Path
 import numpy as np
 from av.video.reformatter import VideoReformatter
 
-from lbw_minimal import motion
-from lbw_minimal.decoding import AGAIN, Decoder, Stream, look
+from lbw_minimal.clips import motion
+from lbw_minimal.clips.decoding import AGAIN, Decoder, Stream, look
+from lbw_minimal.clips.upright import WHOLE, Upright, borders
 from lbw_minimal.training import InputError, progress
-from lbw_minimal.upright import WHOLE, Upright, borders
 
 RATE = 25.0  # frames a second, at which the kit's tasks run
 MOST = 200_000_000  # bytes of frames in memory: 46 s of a 16:9 film at RATE

@@ -9,9 +9,9 @@ import av
 import numpy as np
 from av.video.reformatter import VideoReformatter
 
-from lbw_minimal import hdr
-from lbw_minimal.decoding import Stream
-from lbw_minimal.motion import some
+from lbw_minimal.clips import hdr
+from lbw_minimal.clips.decoding import Stream
+from lbw_minimal.clips.motion import some
 
 SIDE = 320  # pixels, the longer side of a frame: four times what the kit's networks see
 HD = 720  # rows from which a film that names no colour matrix has BT.709's, as players assume

@@ -11,7 +11,7 @@ import torch
 import torch.nn.functional as F
 from torch import nn
 
-from lbw_minimal.drawn_shapes import SIZE
+from lbw_minimal.clips.drawn_shapes import SIZE
 
 WIDTH = 32  # channels
 CELLS = 42  # of the map, each way: a cell is two pixels wide

@@ -18,10 +18,10 @@ import numpy as np
 import torch
 from torch import nn
 
-from lbw_minimal.corners import followed
-from lbw_minimal.detector_networks import Network, both_ways, loss, read
-from lbw_minimal.drawings import Clip, draw_clip
-from lbw_minimal.drawn_shapes import SIZE
+from lbw_minimal.clips.corners import followed
+from lbw_minimal.clips.detector_networks import Network, both_ways, loss, read
+from lbw_minimal.clips.drawings import Clip, draw_clip
+from lbw_minimal.clips.drawn_shapes import SIZE
 from lbw_minimal.images import median_frame, to_images
 from lbw_minimal.training import (
     Checkpoint,

@@ -15,8 +15,8 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from lbw_minimal import drawn_shapes as draw
-from lbw_minimal.drawn_shapes import ROUND, SIZE, THINGS, a_colour, a_surface
+from lbw_minimal.clips import drawn_shapes as draw
+from lbw_minimal.clips.drawn_shapes import ROUND, SIZE, THINGS, a_colour, a_surface
 
 FRAMES = 12  # of a clip: enough for a median that does without most of the arm
 HIDDEN = 0.15  # a thing of which less than this share is seen is nowhere
