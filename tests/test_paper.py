@@ -7,7 +7,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import tasks
-from tasks.commands import figures, paper
+from tasks.commands import figures, paper, table
 from tasks.commands.batch import folder
 
 
@@ -105,3 +105,21 @@ def test_controls_are_drawn_as_shares_with_their_interval():
     np.testing.assert_allclose(axis.lines[0].get_xydata(), [[5, 0], [20, 0.5]])
     low, high = np.sort(axis.collections[0].get_paths()[0].vertices[:, 1])[[0, -1]]
     assert low == pytest.approx(0) and high == pytest.approx(0.763, abs=0.001)  # Wilson, 5 of 10
+
+
+def test_the_order_of_methods_is_held_against_the_papers():
+    """The paper: reach equal; push AVID-m last; slide LbW first, AVID-m last; so coffee, drawer."""
+    rates = {"reach": (10, 0, 10), "push": (9, 0, 9), "slide": (2, 0, 9), "coffee": (0, 0, 0)}
+    rates["drawer"] = (0, 10, 10)
+    runs = {
+        (task, change): [{"wins": 10 * n, "episodes": 100}]
+        for task, some in rates.items()
+        for n, change in zip(some, ("classifier", "avid", ""), strict=True)
+    }
+    lines = table.order(runs).splitlines()
+    assert "- reach: Classifier reward is above AVID-m, in the paper equal" in lines
+    assert "- reach: AVID-m is below LbW, in the paper equal" in lines
+    assert not [line for line in lines if "push" in line or "slide" in line]
+    assert "- coffee: AVID-m is not told from LbW, in the paper below it" in lines
+    assert "- drawer: Classifier reward is below AVID-m, in the paper above it" in lines
+    assert sum(line.startswith("-") for line in lines) == 2 + 3 + 2

@@ -63,7 +63,9 @@ def test_the_rivals_stand_above_lbw_as_in_the_paper(runs):
         for seed in range(2):
             finish(batch.folder(runs, task, seed, "classifier"), 3 * seed)
             finish(batch.folder(runs, task, seed, "avid"), 1)
-    *_, two, single = table.table(runs, jobs=1, rivals=True).split("\n\n")
+    *_, two, where, differs, single = table.table(runs, jobs=1, rivals=True).split("\n\n")
+    assert where == "Where the methods' order is not the paper's:"
+    assert "- push: Classifier reward is below LbW, in the paper equal" in differs.splitlines()
     assert len(single.splitlines()) == 2 + 3 * 2
     assert "| Classifier reward | slide | 0/10, 3/10 | 10,000 | 0.2 h |" in single
     head, _, classifier, avid, lbw = two.splitlines()

@@ -7,6 +7,7 @@ every run has a folder of its own.
 
 from __future__ import annotations
 
+import itertools
 import json
 from pathlib import Path
 
@@ -152,7 +153,7 @@ def table(
         ],
     )
     if rivals:
-        text += "\n" + table_two(runs) + "\n" + every_run(runs)
+        text += "\n" + table_two(runs) + "\n" + order(runs) + "\n" + every_run(runs)
     write_atomic(out / "table.md", text)
     write_rows(out / "table.json", runs)
     return text
@@ -171,6 +172,23 @@ def table_two(runs: dict[tuple[str, str], list[Row]]) -> str:
         done = [r for (_, c), some in runs.items() if c == change for r in some]
         rows.append([name, videos, *cells, f"{hours(done)} in {len(done)} runs"])
     return markdown(["method", "expert videos", *tasks.TASKS, "time"], rows)
+
+
+def order(runs: dict[tuple[str, str], list[Row]]) -> str:
+    """Where the methods' order is not Table II's, as a list; ours counts where intervals part."""
+    lines = []
+    for task, (a, b) in itertools.product(tasks.TASKS, itertools.combinations(METHODS, 2)):
+        (_, low_a, high_a), (_, low_b, high_b) = (rate(runs[task, change]) for change in (a, b))
+        ours = (low_a > high_b) - (low_b > high_a)
+        theirs = int(np.sign(TABLE_II[a][task] - TABLE_II[b][task]))
+        if ours != theirs:
+            words = {1: "above", 0: "not told from", -1: "below"}
+            first, second = METHODS[a][0], METHODS[b][0]
+            there = {1: "above it", 0: "equal", -1: "below it"}[theirs]
+            lines.append(f"- {task}: {first} is {words[ours]} {second}, in the paper {there}\n")
+    if not lines:
+        return "The methods stand in the paper's order on every task.\n"
+    return "Where the methods' order is not the paper's:\n\n" + "".join(lines)
 
 
 def every_run(runs: dict[tuple[str, str], list[Row]]) -> str:
