@@ -40,9 +40,9 @@ def read(path: Path | str, whole: bool = False) -> tuple[np.ndarray, list[str]]:
     filmed in takes. Raises InputError if the file is missing, not a video, cut short, shorter than
     two frames, smaller than 84x84, or if nothing moves in it.
     """
-    clip = read_clip(path)
+    clip = read_clip(path, cuts=not whole)
     warnings = list(clip.losses)
-    if clip.cuts and not whole:
+    if clip.cuts:
         pieces, seconds, start = len(clip.cuts) + 1, clip.times[-1], clip.times[clip.cuts]
         clip = steady(clip)
         warnings.append(

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from lbw_minimal import video
+from lbw_minimal.clips import motion
 from lbw_minimal.training import InputError
 
 SHIPPED = Path(__file__).resolve().parent.parent / "tasks" / "videos"
@@ -211,6 +212,12 @@ def test_of_a_loop_that_starts_in_the_middle_the_longest_piece_is_used(tmp_path)
     assert "it jumps at 1.0 s; the longest of 2 pieces is used, 1.0 of 1.6 s." in warning
     everything, warnings = video.read(tmp_path / "mine.mp4", whole=True)
     assert len(everything) == 40 and warnings == []
+
+
+def test_a_film_that_is_taken_whole_is_not_searched_for_cuts(monkeypatch):
+    """The search takes two thirds of the time."""
+    monkeypatch.setattr(motion, "jumps", lambda *_: pytest.fail("searched"))
+    assert len(video.read(SHIPPED / "push" / "random.mp4", whole=True)[0]) == 351
 
 
 def test_enlarged_film_for_a_report_shows_the_same(tmp_path):

@@ -47,12 +47,14 @@ def read_clip(
     stream: int | None = None,
     turn: int | None = None,
     crop: bool = True,
+    cuts: bool = True,
 ) -> Clip:
     """The clip in a file. What the arguments leave open is found out.
 
     start, end: the piece to read, in seconds. stream: 1 for the file's first stream of pictures.
-    turn: degrees clockwise, 0, 90, 180 or 270. crop: whether black borders are cut off. Raises
-    InputError, a sentence with a remedy, if there is no film in the file or it is cut short.
+    turn: degrees clockwise, 0, 90, 180 or 270. crop: whether black borders are cut off. cuts:
+    whether cuts are looked for, which takes most of the time. Raises InputError, a sentence with a
+    remedy, if there is no film in the file or it is cut short.
     """
     path = Path(path)
     streams, said = look(path)
@@ -89,7 +91,8 @@ def read_clip(
             f"{path}: the video has a single frame, a still picture; give one in which the arm "
             "does the task."
         )
-    return Clip(frames, times, motion.jumps(frames, times), best.notes, best.losses)
+    jumps = motion.jumps(frames, times) if cuts else []
+    return Clip(frames, times, jumps, best.notes, best.losses)
 
 
 def steady(clip: Clip) -> Clip:

@@ -102,7 +102,7 @@ class Job:
     recipe: Recipe
     from_scratch: bool
     experts: list[np.ndarray]  # human videos of the task, (N, 84, 84, 3) uint8 each
-    random: np.ndarray  # other human motion, same type; empty where a clip alone is translated
+    random: np.ndarray  # other human motion, same type; empty where nothing learns from it
     trained: Perception | None  # None if perception is to be learnt
     weights: Path  # folder of trained weights
     command: str  # what makes this run again
@@ -128,9 +128,10 @@ def check(name: str, args: argparse.Namespace, argv: list[str]) -> Job:
 
     clip = usable(name, args.video) if args.video and not args.translate_clip else None
     experts = [clip.film] if clip else [read_video(path) for path in videos(name, args)]
-    if args.translate_clip:  # the clip alone is the human domain
-        random = experts[0][:0]
-    else:
+    learns = from_scratch or (args.method == "avid" and not args.evaluate)
+    random = np.empty((0, video.SIZE, video.SIZE, 3), np.uint8)
+    # It takes seconds to read. A clip that is translated is the human domain alone.
+    if learns and not args.translate_clip:
         random = read_video(tasks.VIDEOS / name / "random.mp4", whole=True)
     if lbw:  # whose demonstration is one: the translation sees the others beside random motion
         random = np.concatenate([random, *experts[1:]])
