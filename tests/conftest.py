@@ -1,10 +1,35 @@
 """What all tests share."""
 
+import functools
+
 import pytest
 import torch
+
+import tasks
+
+# Files of more than 20 s, the longest first: two processes so end together.
+LONG = (
+    "test_grading.py", "test_exercises.py", "test_tasks.py", "test_cli.py", "test_systems.py",
+    "test_rivals.py", "test_paper.py", "test_limits.py", "test_answers.py", "test_video.py",
+    "test_sac.py", "test_detector.py", "test_transporter.py", "test_nbgrader.py",
+)  # fmt: skip
+
+
+def pytest_collection_modifyitems(items):
+    ranks = {name: rank for rank, name in enumerate(LONG)}
+    items.sort(key=lambda item: ranks.get(item.path.name, len(LONG)))
 
 
 @pytest.fixture(autouse=True)
 def one_thread():
     """Two threads wait for each other where the second core is busy, and take ten times as long."""
     torch.set_num_threads(1)
+
+
+@pytest.fixture(scope="session", autouse=True)
+def robots_filmed_once():
+    """The film that shows a robot's pace takes seconds, and hangs on its arguments alone."""
+    film = functools.cache(tasks.pace_film)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(tasks, "pace_film", lambda *asked: film(*asked).copy())
+        yield

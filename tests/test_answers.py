@@ -335,14 +335,14 @@ FUNCTIONS = [id for id in ALL if ALL[id].source.startswith("def ")]
 UNREAD = {("2.2", "truncated")}
 
 
-ARGUMENTS = [(id, name) for id in FUNCTIONS for name in parameters(ALL[id])]
+ARGUMENTS = [
+    (id, name) for id in FUNCTIONS for name in parameters(ALL[id]) if (id, name) not in UNREAD
+]
 
 
 @pytest.mark.parametrize("id, name", ARGUMENTS, ids=map("-".join, ARGUMENTS))
 def test_an_argument_cannot_be_hard_coded(id, name):
     """An answer that takes the first value it is given for all values loses points."""
-    if (id, name) in UNREAD:
-        pytest.skip("an answer has no use for it")
     exercise = ALL[id]
     inner = exercise.source.replace(f"def {exercise.name}(", "def _answer(", 1)
     names = parameters(exercise)

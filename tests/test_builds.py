@@ -65,10 +65,10 @@ class Build:
 @pytest.fixture(scope="module")
 def builds():
     if not OTHER.is_dir():
-        pytest.skip("the other build is not installed; `make builds` brings it")
+        pytest.skip("needs the other build: make builds")
     both = [Build(ROOT), Build(OTHER)]
     if not both[0].has_numpy:
-        pytest.skip("for this Python and system there is one build alone")
+        pytest.skip("needs Python 3.11 on Linux x86-64, which has both builds")
     yield both
     for build in both:
         build.process.kill()

@@ -48,7 +48,7 @@ def test_a_name_is_only_a_name(tmp_path, monkeypatch, name):
     try:
         (tmp_path / "plain.mp4").rename(tmp_path / name)
     except OSError:
-        pytest.skip("this system has no such names")
+        pytest.skip("needs a system that has such names")
     monkeypatch.chdir(tmp_path)
     assert len(read_clip(name).frames) == 10
 
@@ -270,7 +270,7 @@ def test_a_piece_can_be_asked_for(tmp_path):
     assert len(clip.frames) == 26 and shows(clip.frames, reach(100)[25:51]) < 8
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="/proc tells the peak")
+@pytest.mark.skipif(sys.platform != "linux", reason="needs Linux, whose /proc tells the peak")
 def test_4k_needs_little_memory(tmp_path):
     """60 frames are 750 MB, if what was decoded is kept; torch alone takes 200."""
     large = (cv2.resize(f, (3840, 2160), interpolation=cv2.INTER_NEAREST) for f in [reach(1)[0]])

@@ -65,7 +65,7 @@ def starts(tmp_path, monkeypatch):
 @pytest.fixture
 def nodes(monkeypatch):
     """A Ray cluster: a head that runs nothing, two nodes of one core in processes of their own."""
-    ray = pytest.importorskip("ray", reason="requirements-cluster.txt is not installed")
+    ray = pytest.importorskip("ray", reason="needs Ray: make cluster")
     from ray.cluster_utils import Cluster
 
     monkeypatch.setenv("RAY_USAGE_STATS_ENABLED", "0")

@@ -143,7 +143,9 @@ def test_text_is_no_film_of_a_terminal(tmp_path):
         read_clip(tmp_path / "notes.txt")
 
 
-@pytest.mark.skipif(os.name == "nt" or os.geteuid() == 0, reason="everybody may read it")
+@pytest.mark.skipif(
+    os.name == "nt" or os.geteuid() == 0, reason="needs a user who may not read every file"
+)
 def test_a_file_that_may_not_be_read_says_so(tmp_path):
     encode(tmp_path / "mine.mp4", reach()).chmod(0)
     with pytest.raises(InputError, match="Permission denied"):

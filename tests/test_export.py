@@ -42,7 +42,7 @@ def test_without_minari_it_says_how_to_get_it(two_experts, monkeypatch, capfd):
 
 @pytest.mark.peers
 def test_minari_reads_back_what_the_environment_shows_again(two_experts, capfd):
-    minari = pytest.importorskip("minari")
+    minari = pytest.importorskip("minari", reason="needs Minari: make peers")
     assert main(["export", "reach"]) == 0
     assert "minari.load_dataset('lbw/reach/human-v0')" in capfd.readouterr().out
     assert "minari delete lbw/reach/human-v0" in refused(capfd)
@@ -70,7 +70,7 @@ def test_minari_reads_back_what_the_environment_shows_again(two_experts, capfd):
 
 @pytest.mark.peers
 def test_a_recording_that_no_longer_does_the_task_is_not_exported(two_experts, capfd, tmp_path):
-    pytest.importorskip("minari")
+    pytest.importorskip("minari", reason="needs Minari: make peers")
     still = two_experts[1]._replace(actions=np.zeros_like(two_experts[1].actions))
     save_recordings(tasks.VIDEOS / "reach" / "experts.npz", [two_experts[0], still])
     assert "seed 5 fails" in refused(capfd)
@@ -79,7 +79,7 @@ def test_a_recording_that_no_longer_does_the_task_is_not_exported(two_experts, c
 
 @pytest.mark.peers
 def test_minari_holds_all_the_shipped_experts_of_push(tmp_path, monkeypatch):
-    minari = pytest.importorskip("minari")
+    minari = pytest.importorskip("minari", reason="needs Minari: make peers")
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
     assert main(["export", "push"]) == 0
     experts = load_recordings(tasks.VIDEOS / "push" / "experts.npz")

@@ -281,7 +281,7 @@ def test_a_terminal_that_is_gone_stops_no_class(ann, tmp_path, monkeypatch):
     assert rows(tmp_path / "out")["ann"]["6.1"] == f"{FULL:g}"
 
 
-@pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
+@pytest.mark.skipif(os.geteuid() == 0, reason="needs a user who may not read every file")
 def test_a_file_without_the_right_to_read_it_is_said(tmp_path):
     write(tmp_path, "ann/06_reward.ipynb", RIGHT)
     (tmp_path / "ann" / "06_reward.ipynb").chmod(0)

@@ -186,7 +186,7 @@ def box():
         yield box
 
 
-@pytest.mark.skipif(platform.machine() != "x86_64", reason="the numbers are those of x86_64")
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="needs x86-64, whose calls these are")
 def test_what_no_answer_needs_is_refused(box):
     assert ask(box, TRY, ASKS, str(Path(__file__))) == []
 

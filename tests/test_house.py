@@ -117,6 +117,39 @@ def test_a_missing_encoding_is_found(code, named):
     assert (not list(without_encoding(code))) == named
 
 
+def reasons(code):
+    """Why tests are skipped, skip by skip; None where no reason is given."""
+    for node in ast.walk(ast.parse(code)):
+        bare = [d for d in getattr(node, "decorator_list", ()) if isinstance(d, ast.Attribute)]
+        yield from (None for d in bare if d.attr == "skip")
+        name = getattr(getattr(node, "func", None), "attr", "")
+        if name in ("skip", "skipif", "importorskip"):
+            given = {k.arg: k.value for k in node.keywords}
+            if name == "skip" and node.args:
+                given["reason"] = node.args[0]
+            yield getattr(given.get("reason"), "value", None)
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "tests").rglob("*.py")), ids=lambda p: p.stem)
+def test_who_skips_a_test_says_what_it_needs(path):
+    assert all((reason or "").startswith("needs ") for reason in reasons(path.read_text()))
+
+
+@pytest.mark.parametrize(
+    ("code", "said"),
+    [
+        ("@pytest.mark.skip\ndef test(): ...", [None]),
+        ("@pytest.mark.skip()\ndef test(): ...", [None]),
+        ("@pytest.mark.skipif(True, reason='needs Linux')\ndef test(): ...", ["needs Linux"]),
+        ("pytest.skip('needs Ray')", ["needs Ray"]),
+        ("pytest.importorskip('ray')", [None]),
+        ("check_env(env, skip_render_check=True)", []),
+    ],
+)
+def test_a_skip_without_a_reason_is_found(code, said):
+    assert list(reasons(code)) == said
+
+
 SYSTEM = {"resource", "fcntl", "pwd", "grp", "termios", "pty", "msvcrt", "winreg"}
 
 

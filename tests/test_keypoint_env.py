@@ -75,7 +75,7 @@ def test_unknown_task_and_reward_are_refused(arguments, message):
 
 @pytest.mark.peers
 def test_stable_baselines_trains_on_it_in_the_lines_of_the_readme():
-    pytest.importorskip("stable_baselines3")
+    pytest.importorskip("stable_baselines3", reason="needs stable-baselines3: make peers")
     (lines,) = re.findall(r"(?:^    .*\n)*^    .*stable_baselines3.*\n(?:^    .*\n)*", README, re.M)
     code = re.sub("^    ", "", lines, flags=re.M)
     assert len(code.splitlines()) == 6 and "learn(3_000)" in code

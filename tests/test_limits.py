@@ -15,7 +15,7 @@ from gymnasium.error import ClosedEnvironmentError, InvalidAction, ResetNeeded, 
 import tasks
 
 SCENES = [(name, arm) for name in tasks.TASKS for arm in ("robot", "human")]
-FEW_OR_THOUSAND = [12, pytest.param(1000, marks=pytest.mark.slow)]
+FEW_OR_THOUSAND = [7, pytest.param(1000, marks=pytest.mark.slow)]  # one of each kind, or many
 STEPS = 80  # actions of a sequence; the elbow of slide's robot took 58 to swing up
 CORNERS = np.array(list(itertools.product((-1, 0, 1), repeat=3)))
 

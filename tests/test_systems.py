@@ -3,6 +3,7 @@
 `HIDE` takes from Python what Windows lacks; what it hides is then hidden from every library, too.
 """
 
+import itertools
 import json
 import os
 import signal
@@ -32,18 +33,43 @@ def CDLL(name, *args, **kwargs):
 ctypes.CDLL = CDLL
 """
 ELSEWHERE = {"PYTHONWARNINGS": "ignore", "OMP_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)}
+DONE = "that was all"
+SERVE = f"""
+import contextlib, io, json, traceback
+for line in sys.stdin:
+    folder, code = json.loads(line)
+    os.chdir(folder)
+    said, failed = io.StringIO(), ""
+    try:
+        with contextlib.redirect_stdout(said):
+            exec(code, dict(__name__="__main__"))
+    except BaseException:
+        failed = traceback.format_exc()
+    print(json.dumps([said.getvalue(), failed]), {DONE!r}, sep="\\n", flush=True)
+"""
 
 
-def elsewhere(code, folder):
-    """Run code in an empty folder, in a Python without what Linux has; what it printed."""
-    line = [sys.executable, "-c", HIDE + code]
-    done = subprocess.run(line, cwd=folder, capture_output=True, text=True,
-                          env=os.environ | ELSEWHERE)  # fmt: skip
-    assert done.returncode == 0, done.stderr[-3000:]
-    return done.stdout
+@pytest.fixture(scope="module")
+def elsewhere():
+    """Run code in a folder, in a Python without what Linux has; what it printed."""
+    line = [sys.executable, "-c", HIDE + SERVE]
+    with subprocess.Popen(line, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+                          env=os.environ | ELSEWHERE) as process:  # fmt: skip
+
+        def run(code, folder):
+            process.stdin.write(json.dumps([str(folder), code]) + "\n")
+            process.stdin.flush()
+            lines = list(itertools.takewhile(lambda text: text != DONE + "\n", process.stdout))
+            assert process.poll() is None, "the process has ended"
+            said, failed = json.loads(lines[-1])
+            assert not failed, failed[-3000:]
+            return said
+
+        yield run
+        process.kill()
 
 
-def test_a_run_and_its_page(tmp_path):
+def test_a_run_and_its_page(elsewhere, tmp_path):
     """The policy's training is cut short: its loop has nothing of the system in it."""
     line = ["reach", "--set", "policy_steps=60", "--episodes", "1", "--threads", "1"]
     code = f"from tasks.__main__ import main\nassert main({line}) == 0"
@@ -55,12 +81,12 @@ def test_a_run_and_its_page(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_smoke_run_through_every_stage(tmp_path):
+def test_a_smoke_run_through_every_stage(elsewhere, tmp_path):
     elsewhere("from tasks.__main__ import main\nassert main(['push', '--fast']) == 0", tmp_path)
     assert (tmp_path / "runs" / "push" / "report.html").exists()
 
 
-def test_a_check_in_a_notebook_and_in_the_terminal(tmp_path):
+def test_a_check_in_a_notebook_and_in_the_terminal(elsewhere, tmp_path):
     """An answer of the solved notebook 6 gets its points, and one that never ends is stopped."""
     book = sources()[6]
     source = answer(everything()["6.1"], [read(book)]).source
@@ -89,11 +115,11 @@ assert result.points == result.most
 
 
 @pytest.mark.parametrize("path", sorted(RELEASED.glob("00*.ipynb")), ids=lambda p: p.stem)
-def test_the_first_notebook_up_to_its_first_exercise(path, tmp_path):
+def test_the_first_notebook_up_to_its_first_exercise(elsewhere, path):
     cells = [c.source for c in read(path).cells]
     first = next(i for i, c in enumerate(cells) if "raise NotImplementedError" in c)
-    code = "import os, sys\nos.chdir({!r})\nget_ipython = lambda: None\ndisplay = print\n"
-    elsewhere(code.format(str(path.parent)) + "\n".join(cells[:first]), tmp_path)
+    code = "import os, sys\nget_ipython = lambda: None\ndisplay = print\n"
+    elsewhere(code + "\n".join(cells[:first]), path.parent)
 
 
 def test_the_time_of_an_answer_is_kept_without_an_alarm(monkeypatch):

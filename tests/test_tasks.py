@@ -1,5 +1,6 @@
 """The tasks as environments: the contract with Gymnasium, fairness, and repeatability."""
 
+import hashlib
 import itertools
 import subprocess
 import sys
@@ -17,7 +18,7 @@ from tasks.world import RED, Leg, TaskEnv, expert_actions, record_random
 IDS = [f"LbW-{name.capitalize()}-v0" for name in tasks.TASKS]
 EMBODIMENTS = ("robot", "human")
 # Episodes of what is true of every start: a few each time, a hundred with `make slow`.
-FEW_AND_MANY = [20, pytest.param(100, marks=pytest.mark.slow)]
+FEW_AND_MANY = [8, pytest.param(100, marks=pytest.mark.slow)]
 
 
 def make(id, **options):
@@ -34,7 +35,7 @@ def test_gymnasium_has_nothing_to_complain_about(id, embodiment):
     env.close()
 
 
-@pytest.mark.parametrize("episodes", [5, pytest.param(20, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("episodes", [3, pytest.param(20, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("id", IDS)
 def test_standing_still_solves_nothing(id, episodes):
     env = make(id, observation="state", jitter=0.005)
@@ -246,12 +247,10 @@ def test_the_same_seed_gives_the_same_frames_in_two_processes():
         "frames, _ = tasks.world.record_random(env, 60, seed=5); "
         "print(hashlib.sha256(frames.tobytes()).hexdigest())"
     )
-    out = [
-        subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-        for _ in range(2)
-    ]
-    assert len(out[0].stdout) == 65, "one line, and nothing from PyBullet"
-    assert out[0].stdout == out[1].stdout
+    other = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True).stdout
+    frames, _ = record_random(make("LbW-Push-v0").unwrapped, 60, seed=5)
+    assert len(other) == 65, "one line, and nothing from PyBullet"
+    assert other.strip() == hashlib.sha256(frames.tobytes()).hexdigest()
 
 
 @pytest.mark.parametrize("embodiment", EMBODIMENTS)

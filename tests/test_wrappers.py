@@ -209,9 +209,10 @@ def test_our_agent_trains_on_it(reward):
     assert np.isfinite(log[-1]["critic_loss"]) and log[-1]["r1"] < 0
 
 
+@pytest.mark.peers
 def test_stable_baselines_trains_on_it(reward):
     """Any agent that speaks Gymnasium can train on the kit; this one from outside."""
-    sb3 = pytest.importorskip("stable_baselines3")
+    sb3 = pytest.importorskip("stable_baselines3", reason="needs stable-baselines3: make peers")
     env = wrap(gym.wrappers.TimeLimit(ToyPush(), 50), reward)
     agent = sb3.SAC(
         "MlpPolicy", env, learning_starts=50, policy_kwargs={"net_arch": [16, 16]}, seed=0

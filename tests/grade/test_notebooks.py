@@ -49,9 +49,9 @@ def books():
 def test_exercise(exercise, box, books):
     given = answer(exercise, books)
     if given is None:
-        pytest.skip("its cell is gone")
+        pytest.skip("needs its cell, which is gone")
     result = graded(exercise, given, box)
     if result.open:
-        pytest.skip("still open")
+        pytest.skip("needs an answer: the exercise is still open")
     if result.points < result.most:  # a traceback would show the reference
         pytest.fail("\n".join(["", *result.lines()]), pytrace=False)
