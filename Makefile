@@ -21,7 +21,8 @@ test: $(VENV)/ready
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/python -m pytest -q -n auto --dist loadfile -m "not slow and not peers"
+	$(BIN)/python -m pytest -q -rs -n auto --dist loadfile --no-loadscope-reorder \
+	    -m "not slow and not peers"
 
 slow: $(VENV)/ready
 	$(BIN)/python -m pytest -q -m slow
