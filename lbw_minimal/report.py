@@ -35,8 +35,10 @@ from lbw_minimal.report_texts import (
     HTML,
     INTRODUCTION,
     LEARNING,
+    LEARNT,
     PATHS,
     PERCEPTION,
+    REPLAY,
     REWARD,
     SCENE,
     SHOWN,
@@ -45,6 +47,12 @@ from lbw_minimal.report_texts import (
 )
 from lbw_minimal.training import write_atomic
 
+FILMING = ("robot_video", "robot_experts")  # stages in which nothing is learnt
+LEARNS = {  # the others, by method
+    "lbw": ("translation", "keypoints", "policy"),
+    "avid": ("translation", "classifier", "policy"),
+    "classifier": ("classifier", "policy"),
+}
 EPISODE_TITLE, FILM = "What the robot does now", "Film of a test episode"
 MACHINE = (
     "version",
@@ -152,13 +160,19 @@ def headline(task: str, metrics: dict[str, Any], method: str = "lbw") -> str:
         title = f"{name}: {round(result['rate'] * n)} of {n} test episodes succeed"
         low, rate, high = (round(100 * result[key]) for key in ("low", "rate", "high"))
         tiles = [(f"{rate} %", "success rate"), (f"{low}-{high} %", "95 % confidence interval")]
+    notes = [SMOKE] if settings.get("fast") else []
+    shown = ["reward" if method == "lbw" else "method"]
     if stages := metrics.get("stages"):
-        tiles += [(duration(sum(stages.values())), "of learning in this run")]
-    shown = ("seed", "reward") if method == "lbw" else ("seed", "method")
+        taught = {name: s for name, s in stages.items() if name not in FILMING}
+        if taught:
+            tiles += [(duration(sum(taught.values())), "of learning in this run")]
+            shown = ["seed", *shown]  # a replay's is not the one that the policy learnt with
+        if not set(LEARNS[method]) <= set(taught):
+            notes += [LEARNT.format(escape(", ".join(taught))) if taught else REPLAY]
     tiles += [(str(settings[key]), key) for key in shown if key in settings]
     cells = "".join(f"<div><b>{escape(v)}</b><span>{label}</span></div>" for v, label in tiles)
-    note = f'<p class="note">{SMOKE}</p>' if settings.get("fast") else ""
-    return f'<h1>{title}</h1>\n<div class="tiles">{cells}</div>\n{note}{INTRODUCTION[method]}'
+    noted = "".join(f'<p class="note">{note}</p>' for note in notes)
+    return f'<h1>{title}</h1>\n<div class="tiles">{cells}</div>\n{noted}{INTRODUCTION[method]}'
 
 
 def demonstration(
@@ -198,7 +212,10 @@ def figures(metrics: dict[str, Any]) -> list[str]:
         rest = {name: value for name, value in perception.items() if name not in scores}
         tables = table([("", *scores), *rows]), table(flat(rest))
         page += section("Perception, measured", PERCEPTION, *tables)
-    settings = flat(metrics.get("settings", {}))
+    given = dict(metrics.get("settings", {}))
+    if stages and set(stages) <= set(FILMING):  # a replay follows no recipe
+        given.pop("recipe", None)
+    settings = flat(given)
     settings += flat({k: v for k, v in metrics.items() if k in MACHINE})
     return page + (section("Settings", table(settings)) if settings else [])
 

@@ -177,3 +177,5 @@ move.</p>
 
 
 SMOKE = "This was a smoke run: no stage ran long enough to learn. Its figures say nothing."
+LEARNT = "Learnt in this run: {}. The rest was trained before."
+REPLAY = "A replay: nothing was learnt in this run. What it shows was trained before."

@@ -1,17 +1,21 @@
 """The course is made from the notebooks in this folder.
 
 `python -m solutions release` writes the student version to `notebooks/`, by nbgrader's own
-preprocessors. `python -m solutions book` executes the solutions and writes them as web pages to
-`runs/book/`, which need no network: equations are MathML, pictures and scenes are in the pages.
+preprocessors. `python -m solutions archive` writes the kit without the solved notebooks to
+`runs/lbw.zip`, for students. `python -m solutions book` executes the solutions and writes them as
+web pages to `runs/book/`, which need no network: equations are MathML, pictures and scenes are in
+the pages.
 """
 
 from __future__ import annotations
 
 import argparse
 import re
+import subprocess
 import sys
 from html import escape
 from pathlib import Path
+from zipfile import ZIP_DEFLATED, ZipFile
 
 import nbformat
 from latex2mathml.converter import convert
@@ -28,13 +32,13 @@ from nbgrader.preprocessors import (
 )
 from traitlets.config import Config
 
-from lbw_minimal.training import write_atomic
+from lbw_minimal.training import InputError, write_atomic
 from tests.grade.cell.answer import STUB
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
 NOTEBOOKS = ROOT / "notebooks"
-BOOK = ROOT / "runs" / "book"
+BOOK, ARCHIVE = ROOT / "runs" / "book", ROOT / "runs" / "lbw.zip"
 TIMEOUT = 1800  # s, for one cell
 STYLE = """
 body { margin: 0 auto !important; max-width: 62rem; padding: 0 1rem 4rem }
@@ -67,6 +71,23 @@ def sources() -> list[Path]:
     return sorted(HERE.glob("[0-9][0-9]_*.ipynb"))
 
 
+def wanted(numbers: list[str]) -> list[Path]:
+    """The solved notebooks with these numbers, such as 06; all if there are none.
+
+    Raises InputError where one is missing.
+    """
+    found = {source.stem[:2]: source for source in sources()}
+    if not found:
+        raise InputError(
+            f"{HERE.name}/ has no solved notebooks here, as in the archive for students; "
+            "the book and notebooks/ are made from them, in the whole kit."
+        )
+    for number in numbers:
+        if number not in found:
+            raise InputError(f"there is no notebook {number}; there are {', '.join(found)}.")
+    return [found[number] for number in sorted(set(numbers))] or [*found.values()]
+
+
 def student(source: Path) -> str:
     """The student version of a solved notebook, as the text of its file."""
     steps = [ClearSolutions, LockCells, CheckCellMetadata, ClearOutput]
@@ -79,9 +100,29 @@ def student(source: Path) -> str:
 
 
 def release() -> None:
-    """Write `notebooks/` anew."""
-    for source in sources():
+    """Write `notebooks/` anew. Raises InputError if there are no solved notebooks."""
+    for source in wanted([]):
         write_atomic(NOTEBOOKS / source.name, student(source))
+
+
+def archive(path: Path = ARCHIVE) -> None:
+    """Write the kit's own files but for the solved notebooks to a zip, in a folder `lbw`.
+
+    Raises InputError if git does not know which files are the kit's.
+    """
+    try:
+        listed = subprocess.check_output(
+            ["git", "ls-files", "-z"], cwd=ROOT, text=True, stderr=subprocess.DEVNULL
+        )
+    except (OSError, subprocess.CalledProcessError):
+        raise InputError(
+            "git does not know the kit's files here; make the archive in a clone of it."
+        ) from None
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with ZipFile(path, "w", ZIP_DEFLATED) as out:
+        for name in filter(None, listed.split("\0")):
+            if ROOT / name not in sources():
+                out.write(ROOT / name, f"lbw/{name}")
 
 
 def execute(source: Path) -> nbformat.NotebookNode:
@@ -158,13 +199,14 @@ def contents() -> str:
 
 
 def book(only: list[str]) -> int:
-    """Execute and write the pages; returns how many notebooks failed."""
+    """Execute and write the pages; returns how many notebooks failed.
+
+    Raises InputError if one of them is missing.
+    """
+    asked, failed = wanted(only), 0
     BOOK.mkdir(parents=True, exist_ok=True)
-    failed = 0
     write_atomic(BOOK / "index.html", contents())
-    for source in sources():
-        if only and source.stem[:2] not in only:
-            continue
+    for source in asked:
         print(source.stem, flush=True)
         try:
             notebook = execute(source)
@@ -177,14 +219,27 @@ def book(only: list[str]) -> int:
 
 
 def main() -> int:
+    """Do what is asked; returns the exit code: 1 if a notebook failed, 2 for a mistake."""
     parser = argparse.ArgumentParser(prog="python -m solutions", description=__doc__.split("\n")[0])
-    parser.add_argument("what", choices=["release", "book"])
-    parser.add_argument("only", nargs="*", help="numbers of notebooks, such as 06; default: all")
+    parser.add_argument("what", choices=["release", "archive", "book"])
+    parser.add_argument("only", nargs="*", help="numbers of the book's notebooks, such as 06")
     args = parser.parse_args()
-    if args.what == "release":
-        release()
-        return 0
-    return 1 if book(args.only) else 0
+    try:
+        if args.what == "book":
+            failed = book(args.only)
+            print(f"book: {(BOOK / 'index.html').relative_to(ROOT)}")
+            return 1 if failed else 0
+        if args.only:
+            raise InputError(f"{args.what} takes no numbers; only the book does.")
+        if args.what == "release":
+            release()
+        else:
+            archive()
+            print(f"archive: {ARCHIVE.relative_to(ROOT)}")
+    except InputError as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    return 0
 
 
 if __name__ == "__main__":

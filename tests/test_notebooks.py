@@ -1,15 +1,15 @@
 """The notebooks: the student version is the source without its answers; both fit the checks."""
 
 import ast
-import os
 import re
-import subprocess
 import sys
+import time
 
 import nbformat
 import pytest
+from nbconvert.preprocessors import ExecutePreprocessor
 
-from solutions.__main__ import MATH, NOTEBOOKS, ROOT, contents, page, sources, student
+from solutions.__main__ import HERE, MATH, NOTEBOOKS, ROOT, contents, page, sources, student
 from tests.grade.__main__ import grade, main
 from tests.grade.cell.answer import STUB
 from tests.grade.exercise import everything
@@ -96,11 +96,84 @@ def test_it_is_python_and_asks_a_question_first(path):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("folder", [ROOT, NOTEBOOKS], ids=["root", "notebooks"])
 @by_name
-def test_a_solution_runs_headless_within_two_minutes(path, tmp_path):
-    command = [sys.executable, "-m", "jupyter", "nbconvert", "--to", "notebook", "--execute"]
-    where = [str(path), "--output-dir", str(tmp_path)]
-    subprocess.run([*command, *where], check=True, timeout=120, env=os.environ | {"LBW_FAST": "1"})
+def test_a_solution_runs_headless_within_two_minutes(path, folder, monkeypatch):
+    """Started in either folder, as JupyterLab and editors do."""
+    monkeypatch.setenv("LBW_FAST", "1")
+    notebook = nbformat.read(path, 4)
+    start = time.monotonic()
+    run = ExecutePreprocessor(timeout=120, kernel_name="python3")
+    run.preprocess(notebook, {"metadata": {"path": str(folder)}})
+    assert time.monotonic() - start < 120
+
+
+@pytest.mark.parametrize("folder", [ROOT, NOTEBOOKS, HERE], ids=lambda p: p.name)
+@by_name
+def test_the_kit_is_found_wherever_a_notebook_is_started(path, folder, monkeypatch):
+    head, _, _ = nbformat.read(path, 4).cells[1].source.partition("FAST = ")
+    monkeypatch.chdir(folder)
+    monkeypatch.setattr("sys.path", ["elsewhere"])
+    exec(head, {})
+    assert sys.path == [str(ROOT), "elsewhere"]
+
+
+def relative(tree):
+    """Texts in code that are paths from the folder in which it runs."""
+    takes = {"Path", "open", "read", "load", "save", "savefig", "imread", "imwrite", "exists"}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str):
+            if node.value == ".." or node.value.startswith(("./", "../", "~")):
+                yield node.value
+        elif isinstance(node, ast.Call):
+            name = getattr(node.func, "attr", getattr(node.func, "id", ""))
+            for given in node.args[:1] if name in takes else []:
+                if isinstance(given, ast.Constant) and isinstance(given.value, str):
+                    yield given.value
+
+
+@by_name
+def test_no_path_depends_on_where_a_notebook_is_started(path):
+    for cell in nbformat.read(path, 4).cells:
+        if cell.cell_type == "code":
+            assert not [*relative(ast.parse(cell.source))], cell.source
+            if not cell.source.startswith("import os\n"):
+                assert not re.search(r"\bcwd\b|\bgetcwd\b|chdir|\bPath\(\)", cell.source)
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        'Path("..") / "solutions"',
+        'open("results/x.json")',
+        'video.read("my.mp4")',
+        'plt.savefig("a.png")',
+        'name = "./x"',
+    ],
+)
+def test_a_path_from_the_working_folder_is_noticed(code):
+    assert [*relative(ast.parse(code))]
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "said"),
+    [
+        (0.0, 0.0, "no width"),
+        (1.0, 1.0, "no width"),
+        (0.1, 0.4, "costs something"),
+        (-0.1, 0.2, "cannot tell"),
+        (0.0, 0.3, "cannot tell"),
+        (-0.4, -0.1, "better left out"),
+    ],
+)
+def test_an_interval_without_width_is_not_read_as_a_proof(low, high, said):
+    """Three equal seeds against three others: however far apart, the bootstrap is blind."""
+    cells = [c.source for c in nbformat.read(SOURCES[10], 4).cells]
+    tree = ast.parse(next(c for c in cells if "def reading(" in c))
+    tree.body = [node for node in tree.body if getattr(node, "name", "") == "reading"]
+    space = {}
+    exec(compile(tree, "notebook 10", "exec"), space)
+    assert said in space["reading"](low, high)
 
 
 @by_name

@@ -235,6 +235,32 @@ def test_a_smoke_run_says_so(tmp_path, page, run):
     assert "smoke run" in written(tmp_path, run | {"metrics": {"settings": {"fast": True}}})
 
 
+def test_a_replay_claims_no_learning(tmp_path, run):
+    """Of a replay's stages all is filming: no time of learning, no seed, no recipe."""
+    settings = {"seed": 7, "method": "lbw", "recipe": {"policy_steps": 3000}}
+    run |= {"metrics": {"stages": {"robot_video": 16.0}, "settings": settings}}
+    page = written(tmp_path, run)
+    assert "nothing was learnt in this run" in page
+    assert "of learning" not in page and "<span>seed" not in page and "3000" not in page
+
+
+@pytest.mark.parametrize(
+    ("method", "stages", "said"),
+    [
+        ("lbw", ["policy"], "Learnt in this run: policy. The rest was trained before."),
+        ("lbw", ["translation", "keypoints", "policy"], None),
+        ("avid", ["classifier", "policy"], "Learnt in this run: classifier, policy."),
+        ("classifier", ["classifier", "policy"], None),
+    ],
+)
+def test_what_was_trained_before_is_told_from_what_was_learnt(tmp_path, run, method, stages, said):
+    times = {"robot_video": 16.0} | dict.fromkeys(stages, 60.0)
+    run |= {"metrics": {"stages": times, "settings": {"method": method}}}
+    page = written(tmp_path, run)
+    assert f"<b>{report.duration(60 * len(stages))}</b><span>of learning" in page
+    assert said in page if said else "trained before" not in page
+
+
 def test_text_of_the_run_cannot_break_the_page(tmp_path, run):
     run |= {"task": "<script>x", "command": "a & b < c"}
     run |= {"metrics": {"settings": {"video": '"><script>y'}}}
