@@ -8,7 +8,7 @@ RUN apt-get update && apt-get install -y --no-install-recommends \
         bubblewrap chromium fonts-dejavu-core git make \
     && rm -rf /var/lib/apt/lists/*
 # Outside the kit's folder, which an editor replaces by the reader's own.
-ENV VENV=/opt/lbw PATH=/opt/lbw/bin:$PATH
+ENV VENV=/opt/lbw PATH=/opt/lbw/bin:$PATH JUPYTER_CONFIG_PATH=/lbw/.jupyter
 ARG TORCH_INDEX=
 WORKDIR /lbw
 COPY Makefile requirements.txt requirements-lock.txt ./

@@ -43,8 +43,9 @@ mutants: $(VENV)/ready
 bench: $(VENV)/ready
 	$(BIN)/python -m tasks bench
 
+# .jupyter hides nbgrader's buttons, which are a lecturer's.
 lab: $(VENV)/ready
-	$(BIN)/jupyter lab --notebook-dir=.
+	JUPYTER_CONFIG_PATH=$(CURDIR)/.jupyter $(BIN)/jupyter lab --notebook-dir=.
 
 notebooks: $(VENV)/ready
 	$(BIN)/python -m solutions release

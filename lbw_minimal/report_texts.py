@@ -30,7 +30,9 @@ table { border-collapse: collapse; margin: .8rem 0; font-size: .92rem; display: 
 th, td { text-align: left; padding: .25rem 1.1rem .25rem 0; border-bottom: 1px solid #e4e4e4 }
 pre { white-space: pre-wrap; background: #f2f4f7; border-radius: 8px; padding: .7rem .9rem;
       overflow-x: auto }
-@media print { .scene { display: none } h2, figure, img, tr { break-inside: avoid } }
+.still { display: none }
+@media print { .scene, iframe { display: none } .still { display: block }
+               h1, h2, h2 + p { break-after: avoid } h2, figure, img, tr { break-inside: avoid } }
 """
 
 HTML = """<!DOCTYPE html>

@@ -40,19 +40,32 @@ ROOT = HERE.parent
 NOTEBOOKS = ROOT / "notebooks"
 BOOK, ARCHIVE = ROOT / "runs" / "book", ROOT / "runs" / "lbw.zip"
 TIMEOUT = 1800  # s, for one cell
+# What the kernel does before the first cell, for the figures' alt texts.
+DESCRIBED = (f"import sys; sys.path.insert(0, {str(ROOT)!r})",
+             "from solutions.alt import install; install(); sys.path.pop(0)")  # fmt: skip
 STYLE = """
 body { margin: 0 auto !important; max-width: 62rem; padding: 0 1rem 4rem }
 nav { position: sticky; top: 0; z-index: 9; display: flex; gap: 1.5rem; padding: .6rem 1rem;
-  background: #fff; border-bottom: 1px solid #ddd; font: 15px system-ui, sans-serif }
+  background: #fff; border-bottom: 1px solid #ddd; font: 15px system-ui, sans-serif;
+  flex-wrap: wrap }
 nav label { margin-left: auto }
 body:has(#plain:checked) .jp-InputArea:has(.jp-CodeMirrorEditor) { display: none }
 body:has(#plain:checked) .jp-InputPrompt { visibility: hidden }
 body:has(#plain:checked) .jp-OutputPrompt { visibility: hidden }
 math[display=block] { margin: .8em 0 }
 img { max-width: 100% }
+.jp-InputArea-editor, .jp-OutputArea-output { overflow-x: auto !important }
+.jp-InputPrompt, .jp-OutputPrompt { opacity: 1 !important }
+/* nbconvert's colours, dark enough for small type on grey: 4.5 to 1 and more */
+.highlight .o, .highlight .ow { color: #8414c8 !important }
+.highlight .c1 { color: #356e6e !important }
+.highlight .mi, .highlight .mf { color: #007000 !important }
 @media print {
-  nav, iframe { display: none }
-  .jp-Cell, figure, img { break-inside: avoid }
+  nav, iframe { display: none !important }
+  pre { white-space: pre-wrap !important; overflow-wrap: anywhere }
+  .jp-InputArea-editor, .jp-OutputArea-output { overflow: visible !important }
+  figure, img, tr { break-inside: avoid }
+  h1, h2, h3 { break-after: avoid }
 }
 """
 INDEX = """
@@ -126,13 +139,15 @@ def archive(path: Path = ARCHIVE) -> None:
 
 
 def execute(source: Path) -> nbformat.NotebookNode:
-    """The solved notebook with its outputs, run where students run it.
+    """The solved notebook with its outputs, its figures with their words.
 
     Raises CellExecutionError.
     """
     notebook, _ = ClearHiddenTests().preprocess(nbformat.read(source, as_version=4), {})
     where = {"metadata": {"path": str(HERE)}}
-    ExecutePreprocessor(timeout=TIMEOUT, kernel_name="python3").preprocess(notebook, where)
+    kernel = ExecutePreprocessor(timeout=TIMEOUT, kernel_name="python3")
+    kernel.extra_arguments = [f"--IPKernelApp.exec_lines={line}" for line in DESCRIBED]
+    kernel.preprocess(notebook, where)
     return notebook
 
 
@@ -167,6 +182,12 @@ def page(notebook: nbformat.NotebookNode, source: Path) -> str:
                 output.text, output.name = re.sub(r"[^\n]*\r", "", output.text), "stdout"
             if GREETING.fullmatch(output.get("text", "")):
                 cell.outputs.remove(output)
+            if png := output.get("data", {}).get(
+                "image/png"
+            ):  # nbconvert would leave out its words
+                said = output.metadata.get("image/png", {}).get("alt", "")
+                uri = f"data:image/png;base64,{''.join(png.split())}"
+                output.data = {"text/html": f'<img alt="{escape(said)}" src="{uri}">'}
     exporter = HTMLExporter(embed_images=True, mathjax_url="", require_js_url="")
     exporter.exclude_anchor_links = True
     name = {"metadata": {"name": escape(opening(source)[0])}}
@@ -194,6 +215,7 @@ def contents() -> str:
     title = "LbW minimal, the course"
     return (
         f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{title}</title>'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f"<style>{INDEX}</style><h1>{title}</h1><ul>{''.join(rows)}</ul></html>\n"
     )
 

@@ -27,6 +27,7 @@ if not any((Path(__file__).parent.parent / "solutions").glob("*.ipynb")):
     collect_ignore += [
         "test_archive.py",
         "test_grading_files.py",
+        "test_pages.py",
         "test_notebooks.py",
         "test_systems.py",
     ]

@@ -321,7 +321,7 @@ def test_on_paper_a_notebook_shows_a_picture_of_the_scene():
     assert picture.shape == (360, 640, 3)
     blue, _, red = picture.reshape(-1, 3).T.astype(int)
     assert (red - blue > 50).mean() > 0.01  # the red box
-    assert "<iframe" in shown and '<source media="not print"' in shown
+    assert "<iframe title=" in shown and "@media print { iframe { display: none } }" in shown
     p.disconnect(client)  # nothing is left to take a picture of, the recording is
     assert "<iframe" in recorder._repr_html_() and "<img" not in recorder._repr_html_()
 

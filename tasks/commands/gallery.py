@@ -33,6 +33,7 @@ TRIO = """
 .trio figure { margin: 0 }
 .trio img, .trio iframe { width: 100%; height: 17rem; object-fit: cover }
 @media (max-width: 40rem) { .trio { grid-template-columns: 1fr } }
+@media print { .trio { grid-template-columns: repeat(3, 1fr) } .trio img { height: 7rem } }
 """
 HEAD = """<!DOCTYPE html>
 <html lang="en">
@@ -82,15 +83,16 @@ def section(name: str, out: Path) -> str:
     perception, robot = tasks.trained_perception(name), tasks.pace_film(name)
     agent = sac.load(tasks.WEIGHTS / name / "policy.safetensors")
     env, _ = watched(gym.make(tasks.id_of(name)), perception, robot)
-    frames, z, won = rollout(env, agent, out / f"{name}-robot.html")
+    frames, z, won, robots = rollout(env, agent, out / f"{name}-robot.html")
     human = tasks.bare(name, embodiment="human")
-    perform(human, out / f"{name}-human.html", "The human, who shows it")
+    shows = perform(human, out / f"{name}-human.html", "The human, who shows it").picture()
+    human.close()
 
     shown = data_uri("image/webp", film(draw_keypoints(frames, z), FPS / 2))
     result = "what it sees at half speed: it " + ("succeeds" if won else "fails")
     trio = [
-        (iframe(name, "human"), "the human, who shows it"),
-        (iframe(name, "robot"), "the robot, as it learnt it"),
+        (scene(name, "human", shows), "the human, who shows it"),
+        (scene(name, "robot", robots), "the robot, as it learnt it"),
         (picture(shown, f"The robot does it: {name}"), result),
     ]
     cells = "".join(
@@ -101,13 +103,19 @@ def section(name: str, out: Path) -> str:
     return f'<section><h2>{title}</h2>{columns}<div class="trio">{cells}</div></section>'
 
 
-def iframe(name: str, arm: str) -> str:
-    """The scene of a task and arm, loaded when it comes into view."""
-    return f'<iframe loading="lazy" title="{name}, {arm}" src="{name}-{arm}.html"></iframe>'
+def scene(name: str, arm: str, png: bytes) -> str:
+    """The scene of a task and arm, loaded when it comes into view; on paper a PNG stands in."""
+    still = (
+        f'<img class="still" alt="{name}, {arm}, at the end" src="{data_uri("image/png", png)}">'
+    )
+    return f'<iframe loading="lazy" title="{name}, {arm}" src="{name}-{arm}.html"></iframe>{still}'
 
 
-def rollout(env: gym.Env, agent: sac.Policy, path: Path) -> tuple[np.ndarray, np.ndarray, bool]:
-    """Frames, keypoints and success of an episode of the policy, whose scene goes to a file."""
+def rollout(
+    env: gym.Env, agent: sac.Policy, path: Path
+) -> tuple[np.ndarray, np.ndarray, bool, bytes]:
+    """Frames, keypoints and success of an episode of the policy, and its end as a PNG; its scene
+    goes to a file."""
     obs, _ = env.reset(seed=SEED)
     base, K = cast(TaskEnv, env.unwrapped), env.get_wrapper_attr("keypoint_reward").z_E.shape[1]
     frames, z, won, over, scene = [], [], False, False, mirror(base)
@@ -119,4 +127,4 @@ def rollout(env: gym.Env, agent: sac.Policy, path: Path) -> tuple[np.ndarray, np
         won |= info["is_success"]
         scene.snap()
     scene.save(path, title="The robot, as it learnt")
-    return np.stack(frames), np.stack(z), won
+    return np.stack(frames), np.stack(z), won, scene.picture()

@@ -9,7 +9,7 @@ import numpy as np
 import tasks
 from tasks.commands import Parser, at_least, make_folder
 from tasks.world import TaskEnv, expert_actions
-from tasks.world.viewer import mirror
+from tasks.world.viewer import Recorder, mirror
 
 
 def parser() -> Parser:
@@ -35,8 +35,8 @@ def main(argv: list[str]) -> None:
     print(f"viewer: {path}")
 
 
-def perform(env: TaskEnv, path: Path, title: str, seed: int = 0) -> None:
-    """Let the scripted expert do the task and write the scene to a file."""
+def perform(env: TaskEnv, path: Path, title: str, seed: int = 0) -> Recorder:
+    """Let the scripted expert do the task, write the scene to a file, and return it."""
     env.reset(seed=seed)
     scene = mirror(env)
     scene.snap()
@@ -44,3 +44,4 @@ def perform(env: TaskEnv, path: Path, title: str, seed: int = 0) -> None:
         env.step(action)
         scene.snap()
     scene.save(path, title=title)
+    return scene

@@ -229,17 +229,15 @@ class Recorder:
 
         On paper, and in viewers that strip scripts, a picture stands in for it.
         """
-        page = html.escape(self.html("scene"))
-        scene = f'<iframe srcdoc="{page}" style="width: 100%; height: 420px; border: 0"></iframe>'
+        page, style = html.escape(self.html("scene")), "width: 100%; height: 420px; border: 0"
+        scene = f'<iframe title="the scene, to turn" srcdoc="{page}" style="{style}"></iframe>'
         if not p.isConnected(self.client):
             return scene
         png = f"data:image/png;base64,{base64.b64encode(self.picture()).decode()}"
-        # 1 x 1, clear
-        nothing = "data:image/gif;base64,R0lGODlhAQABAAAAACH5BAEKAAEALAAAAAABAAEAAAICTAEAOw=="
-        return (
-            f'{scene}<picture><source media="not print" srcset="{nothing}">'
-            f'<img alt="the scene" src="{png}"></picture>'
-        )
+        hide = "@media not print { .still { display: none } }"
+        hide += " @media print { iframe { display: none } }"
+        still = f'<img class="still" alt="the scene, as it is at the end" src="{png}">'
+        return f"<style>{hide}</style>{scene}{still}"
 
     def save(self, path: Path | str, title: str = "PyBullet scene", **options: float) -> None:
         """Write `html(title, **options)` to a file, whole or not at all."""

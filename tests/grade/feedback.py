@@ -40,6 +40,7 @@ def page(done: dict) -> str:
     name = escape(done["submission"])
     return (
         f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{name}</title>'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f"<style>{CSS}</style><h1>{name}: {done['points']:g} of {done['most']:g} points</h1>"
         f"{notes}{''.join(parts)}</html>\n"
     )

@@ -1,0 +1,214 @@
+"""The kit's pages on a wide screen, on a phone and on paper: legible, described, and whole."""
+
+import asyncio
+import re
+
+import nbformat
+import numpy as np
+import pytest
+from jupyterlab_server.config import get_page_config
+
+import tests.test_report as a_run
+from lbw_minimal import report
+from solutions import __main__ as course
+from solutions.alt import words
+from tests import browser
+from tests.grade.feedback import page as feedback
+
+WIDE, PHONE = 1400, 390  # pixels
+SHEET = 718  # pixels: A4 between Chromium's margins
+LEAST = 4.5  # contrast of text, WCAG 2's AA
+LONG = "print(" + " + ".join(f"'the word number {i}'" for i in range(12)) + ")"
+
+# What a reader would miss. A text's colour counts with the opacity of all that it is in.
+AUDIT = """
+(() => {
+  const numbers = s => s.match(/[\\d.]+/g).map(Number);
+  const light = c => c.map(v => v / 255)
+    .map(v => v <= 0.03928 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4)
+    .reduce((sum, v, i) => sum + v * [0.2126, 0.7152, 0.0722][i], 0.05);
+  const up = function* (e) { for (; e; e = e.parentElement) yield getComputedStyle(e); };
+  const behind = e => {
+    for (const s of up(e)) {
+      const c = numbers(s.backgroundColor);
+      if ((c[3] ?? 1) > 0.5) return c;
+    }
+    return [255, 255, 255];
+  };
+  const faint = [], texts = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  while (texts.nextNode()) {
+    const e = texts.currentNode.parentElement, text = texts.currentNode.textContent.trim();
+    if (!text || !e.checkVisibility({visibilityProperty: true})) continue;
+    const ground = behind(e).slice(0, 3), ink = numbers(getComputedStyle(e).color);
+    const share = [...up(e)].reduce((all, s) => all * s.opacity, 1);
+    const [a, b] = [ground, ground.map((v, i) => share * ink[i] + (1 - share) * v)].map(light);
+    const contrast = Math.max(a, b) / Math.min(a, b);
+    if (contrast < LEAST) faint.push([text.slice(0, 20), contrast]);
+  }
+  const shown = [...document.querySelectorAll("body *")].filter(e => e.checkVisibility());
+  const cut = shown.filter(e => e.scrollWidth > e.clientWidth + 2 && e.clientWidth > 0
+    && getComputedStyle(e).overflowX === "hidden");
+  return {
+    faint, cut: cut.map(e => e.className),
+    "no alt": [...document.images].filter(i => !i.alt || i.alt.includes("No desc")).length,
+    "no title": [...document.querySelectorAll("iframe")].filter(f => !f.title).length,
+    "too wide": Math.max(0, document.documentElement.scrollWidth - innerWidth),
+    "no viewport": +!document.querySelector("meta[name=viewport]"),
+    "no language": +!document.documentElement.lang,
+  };
+})()
+""".replace("LEAST", str(LEAST))
+FINE = {"faint": [], "cut": [], "no alt": 0, "no title": 0, "too wide": 0}
+FINE |= {"no viewport": 0, "no language": 0}
+# Blocks whose content does not fit on the paper, and whether a scene or its picture is printed.
+PAPER = """
+(() => {
+  const shown = [...document.querySelectorAll("body *")].filter(e => e.checkVisibility());
+  const far = shown.filter(e => e.getBoundingClientRect().right > innerWidth + 1
+    || (e.scrollWidth > e.clientWidth + 2 && e.clientWidth > 0 && e.tagName !== "SPAN"));
+  return {
+    cut: far.map(e => e.tagName + "." + e.className),
+    scenes: shown.filter(e => e.tagName === "IFRAME").length,
+    stills: shown.filter(e => e.className === "still" && e.clientHeight > 50).length,
+  };
+})()
+"""
+
+
+def book_page():
+    """A page of the book with long code, what check() says, a figure and a scene."""
+    source = course.sources()[1]
+    notebook = nbformat.read(source, as_version=4)
+    notebook.cells = [c for c in notebook.cells if c.cell_type == "markdown"]
+    png = re.search(r"base64,([^\"]*)", report.demonstration(a_run.frames(1), None, None, 25))[1]
+    figure = nbformat.v4.new_output(
+        "display_data", {"image/png": png}, metadata={"image/png": {"alt": "a square"}}
+    )
+    still = (
+        "@media not print { .still { display: none } } @media print { iframe { display: none } }"
+    )
+    scene = nbformat.v4.new_output(
+        "execute_result",
+        {
+            "text/html": f'<style>{still}</style><iframe title="a scene" srcdoc="x"></iframe>'
+            f'<img class="still" alt="a scene" width="200" src="data:image/png;base64,{png}">'
+        },
+        execution_count=2,
+    )
+    said = nbformat.v4.new_output("stream", text="ok 1/1 " + "a long line " * 20 + "\n")
+    code = f'x = 1.5  # a comment\nif x in (1, 2):\n    """text"""\n    {LONG}'
+    notebook.cells.append(
+        nbformat.v4.new_code_cell(code, outputs=[said, figure, scene], execution_count=1)
+    )
+    return course.page(notebook, source)
+
+
+BAD = """<!doctype html><p style="opacity: 0.5; color: #616161">faint</p>
+<img src="data:,"><iframe></iframe><div style="width: 3000px">wide</div>
+<div class="x" style="overflow: hidden; width: 9px">clipped</div>"""
+NAMES = ["book.html", "contents.html", "report.html", "feedback.html"]
+
+
+def write_pages(folder):
+    """Pages of the kit, and a bad one."""
+    (folder / "bad.html").write_text(BAD)
+    (folder / "book.html").write_text(book_page())
+    (folder / "contents.html").write_text(course.contents())
+    report.write_report(folder / "report.html", **a_run.example())
+    outcomes = [
+        {"label": "the value", "points": 0, "most": 2, "message": "the sign is wrong"},
+        {"label": "the shape", "points": 1, "most": 1, "message": None},
+    ]
+    exercise = {"id": "6.1", "title": "Distance", "outcomes": outcomes, "points": 1, "most": 3}
+    done = {"submission": "ann", "points": 1, "most": 3, "notes": ["a note"]}
+    exercise["open"] = False
+    (folder / "feedback.html").write_text(feedback(done | {"exercises": [exercise]}))
+
+
+async def look(folder):
+    """What is seen of each page: name -> (on a wide screen, on a phone, on paper)."""
+    seen = {}
+    # Without --hide-scrollbars a desktop's bar would take 15 pixels from the page.
+    async with browser.opened(folder / "bad.html", folder / "profile", "--hide-scrollbars") as page:
+        for name in ("bad.html", *NAMES):
+            await page.call("Page.navigate", url=(folder / name).as_uri())
+            there = f"location.pathname.endsWith('/{name}') && document.readyState"
+            await page.until(there, "complete")
+            seen[name] = []
+            for media, width, code in (
+                ("screen", WIDE, AUDIT), ("screen", PHONE, AUDIT), ("print", SHEET, PAPER),
+            ):  # fmt: skip
+                size = {"width": width, "height": 900, "deviceScaleFactor": 1}
+                await page.call("Emulation.setDeviceMetricsOverride", mobile=width == PHONE, **size)
+                await page.call("Emulation.setEmulatedMedia", media=media)
+                seen[name].append(await page.js(code))
+    return seen
+
+
+@pytest.fixture(scope="module")
+def seen(tmp_path_factory):
+    """All pages in one browser, whose start takes longest."""
+    if not browser.CHROMIUM:
+        pytest.skip("needs Chromium")
+    folder = tmp_path_factory.mktemp("pages")
+    write_pages(folder)
+    return asyncio.run(look(folder))
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_page_can_be_read_on_a_screen_and_on_a_phone(seen, name):
+    wide, phone, _ = seen[name]
+    assert wide == FINE and phone == FINE
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_page_is_whole_on_paper(seen, name):
+    """A scene, which would be blank there, is a picture."""
+    paper = seen[name][2]
+    assert paper["cut"] == [] and paper["scenes"] == 0
+    assert paper["stills"] == (name == "book.html")
+
+
+def test_what_is_wrong_with_a_page_is_noticed(seen):
+    wide, _, paper = seen["bad.html"]
+    assert wide["faint"][0] == ["faint", pytest.approx(2.17, abs=0.01)]
+    assert wide["cut"] == ["x"] and all(wide[name] for name in FINE)
+    assert paper["cut"] and paper["scenes"] == 1
+
+
+def test_a_figure_is_described_by_its_own_words():
+    from matplotlib.figure import Figure
+
+    figure = Figure()
+    left, middle, right = figure.subplots(1, 3)
+    left.plot([1, 2], label="OSC")
+    left.set(title="along x", xlabel="time (s)", ylabel="to go (cm)")
+    middle.set_title("the arm")
+    middle.axis("off")
+    shown = right.imshow(np.zeros((2, 2)))
+    figure.colorbar(shown, label="reward")
+    said = words(figure)
+    assert said.startswith("along x: to go (cm) over time (s): OSC. the arm. Colours: reward.")
+    assert said.endswith("A picture.")
+
+
+def test_the_kernel_of_the_book_puts_a_figures_words_beside_it(tmp_path, monkeypatch):
+    cell = nbformat.v4.new_code_cell(
+        "import matplotlib.pyplot as plt\nplt.plot([1, 2])\nplt.title('a line')\nplt.show()"
+    )
+    nbformat.write(nbformat.v4.new_notebook(cells=[cell]), tmp_path / "01_x.ipynb")
+    (output,) = course.execute(tmp_path / "01_x.ipynb").cells[0].outputs
+    assert output.metadata["image/png"]["alt"] == "a line."
+
+
+def test_students_do_not_see_nbgraders_buttons(monkeypatch):
+    """`make lab` starts JupyterLab with a folder of settings; a lecturer's own shows them."""
+    line = re.search(r"JUPYTER_CONFIG_PATH=\$\(CURDIR\)/(\S+) .*jupyter lab", _makefile())
+    monkeypatch.setenv("JUPYTER_CONFIG_PATH", str(course.ROOT / line[1]))
+    assert "@jupyter/nbgrader" in get_page_config([])["disabledExtensions"]
+    monkeypatch.delenv("JUPYTER_CONFIG_PATH")
+    assert "@jupyter/nbgrader" not in get_page_config([])["disabledExtensions"]
+
+
+def _makefile():
+    return (course.ROOT / "Makefile").read_text(encoding="utf-8")
