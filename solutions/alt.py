@@ -16,7 +16,7 @@ def words(figure: Figure) -> str:
     said = [panel(axis) for axis in figure.axes]
     plain = sum(not s for s in said)
     counted = {0: [], 1: ["A picture"]}.get(plain, [f"{plain} pictures"])
-    return ". ".join([*filter(None, said), *counted]) + "."
+    return ". ".join(filter(None, [figure.get_suptitle(), *said, *counted])) + "."
 
 
 def panel(axis: Axes) -> str:

@@ -367,7 +367,9 @@ STATED = {
     *(("1.3", name, axis) for name in ("J", "M", "h", "e", "v") for axis in (-1, -2)),
     *(("4.3", name, -3) for name in "xy"), ("5.3", "h_x", -3), ("5.3", "h_y", -3),
     *(("5.4", name, -3) for name in ("y_hat", "y", "median")), ("5.4", "median", -4),
-    ("9.3", "demo", -1), ("9.3", "robot", -1),
+    ("9.3", "demo", -1), ("9.3", "robot", -1), ("12.2", "tip", -1),
+    *(("12.3", name, -1) for name in ("start", "end", "scene_start", "scene_end")),
+    *(("12.4", name, -1) for name in ("path", "start", "end")),
 }  # fmt: skip
 
 

@@ -2,12 +2,16 @@
 
 import re
 
+import cv2
+
 import tasks
-from tasks.commands import gallery
+from tasks.commands import gallery, own_arm
 
 
 def test_the_page_shows_a_task_with_its_two_scenes(tmp_path, monkeypatch):
     monkeypatch.setattr(tasks, "TASKS", ("reach",))
+    monkeypatch.setattr(own_arm, "prepared", lambda: None)
+    monkeypatch.setattr(own_arm, "section", lambda clip: "")
     page = gallery.write(tmp_path).read_text()
     scenes = re.findall(r'<iframe[^>]* src="([^"]+)"', page)
     assert scenes == ["reach-human.html", "reach-robot.html"]
@@ -18,3 +22,23 @@ def test_the_page_shows_a_task_with_its_two_scenes(tmp_path, monkeypatch):
     assert page.count('<img class="still" alt="reach, ') == 2  # what is printed of the scenes
     assert str(tmp_path) not in page and str(tasks.ROOT) not in page
     assert not re.search(r'(?:src|href)="(?!data:|reach-)', page)
+
+
+def test_a_clip_of_ones_own_is_shown_and_called_a_look_alike():
+    """It is read from a file, found usable, and done again; six of its moments make a picture."""
+    clip = own_arm.prepared()
+    assert clip.verdict.startswith("usable") and clip.done.recording.success[-1]
+    moments = own_arm.columns(clip, 6)
+    assert len(moments) == 6 and moments[0][0] == 0
+    assert all(image.shape == (189 + 252 + 252, 252, 3) for _, image in moments)
+    page = own_arm.section(clip)
+    assert page.count('<img src="data:') == 8 == page.count('alt="At ')
+    assert "look-alike" in page and "no real person's clip" in page
+
+
+def test_the_readmes_picture_is_of_the_same_kind_and_says_so():
+    text = (tasks.ROOT / "README.md").read_text(encoding="utf-8")
+    (alt,) = re.findall(r"!\[([^]]*)\]\(solutions/weights/eyes/lookalike\.png\)", text)
+    assert "look-alike" in alt and "simulator" in alt
+    picture = cv2.imread(str(tasks.WEIGHTS / "eyes" / "lookalike.png"))
+    assert picture.shape[1] == 6 * 168 and picture.std() > 20

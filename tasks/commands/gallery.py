@@ -1,4 +1,5 @@
-"""One page that shows all tasks: scene, demonstration, what the robot saw in it, and a rollout.
+"""One page that shows all tasks: scene, demonstration, what the robot saw in it, and a rollout;
+and, below them, what becomes of a clip of one's own.
 
 In: the human videos and the trained weights that come with the kit. Out: `index.html` with the
 pictures in it, and beside it a scene for every task and arm that turns with the mouse, each a file
@@ -21,7 +22,7 @@ from lbw_minimal.pictures import data_uri, draw_keypoints, film, picture
 from lbw_minimal.report import demonstration
 from lbw_minimal.report_texts import CSS
 from lbw_minimal.training import write_atomic
-from tasks.commands import Parser, make_folder
+from tasks.commands import Parser, make_folder, own_arm
 from tasks.commands.viewer import perform
 from tasks.world import TaskEnv
 from tasks.world.scene import FPS
@@ -72,6 +73,7 @@ def write(out: Path) -> Path:
     for name in tasks.TASKS:
         page.append(section(name, out))
         print(f"{name}: done", flush=True)
+    page.append(own_arm.section(own_arm.prepared()))
     page.append("</body>\n</html>\n")
     write_atomic(out / "index.html", "".join(page))
     return out / "index.html"

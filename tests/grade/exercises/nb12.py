@@ -127,7 +127,7 @@ def _cut_film(rng, frames, slow=None, waits=True):
     steps, shares = np.array(steps[:-1]), np.array(shares[:-1])
     angle = rng.choice([0.25, 0.75, 1.25, 1.75], len(steps)) * np.pi + rng.uniform(-0.2, 0.2)
     way = np.stack([np.cos(angle), np.sin(angle)], 1) * (most * shares * steps)[:, None]
-    tip = np.concatenate([[[150, 90]], 150 + np.cumsum(way, axis=0)])
+    tip = (150, 90) + np.concatenate([[[0, 0]], np.cumsum(way, axis=0)])
     return np.concatenate([[0], np.cumsum(steps)]) + float(rng.uniform(0, 3)), tip, most
 
 
