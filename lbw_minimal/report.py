@@ -47,8 +47,7 @@ from lbw_minimal.report_texts import (
 )
 from lbw_minimal.training import write_atomic
 
-FILMING = ("robot_video", "robot_experts")  # stages in which nothing is learnt
-LEARNS = {  # the others, by method
+LEARNS = {  # the stages in which something is learnt; the others film
     "lbw": ("translation", "keypoints", "policy"),
     "avid": ("translation", "classifier", "policy"),
     "classifier": ("classifier", "policy"),
@@ -163,7 +162,7 @@ def headline(task: str, metrics: dict[str, Any], method: str = "lbw") -> str:
     notes = [SMOKE] if settings.get("fast") else []
     shown = ["reward" if method == "lbw" else "method"]
     if stages := metrics.get("stages"):
-        taught = {name: s for name, s in stages.items() if name not in FILMING}
+        taught = {name: stages[name] for name in LEARNS[method] if name in stages}
         if taught:
             tiles += [(duration(sum(taught.values())), "of learning in this run")]
             shown = ["seed", *shown]  # a replay's is not the one that the policy learnt with
@@ -213,7 +212,7 @@ def figures(metrics: dict[str, Any]) -> list[str]:
         tables = table([("", *scores), *rows]), table(flat(rest))
         page += section("Perception, measured", PERCEPTION, *tables)
     given = dict(metrics.get("settings", {}))
-    if stages and set(stages) <= set(FILMING):  # a replay follows no recipe
+    if stages and "policy" not in stages:  # a replay follows no recipe
         given.pop("recipe", None)
     settings = flat(given)
     settings += flat({k: v for k, v in metrics.items() if k in MACHINE})

@@ -55,6 +55,9 @@ body:has(#plain:checked) .jp-OutputPrompt { visibility: hidden }
 math[display=block] { margin: .8em 0 }
 img { max-width: 100% }
 .jp-InputArea-editor, .jp-OutputArea-output { overflow-x: auto !important }
+@media print, (max-width: 40rem) {
+  pre { white-space: pre-wrap !important; overflow-wrap: anywhere }
+}
 .jp-InputPrompt, .jp-OutputPrompt { opacity: 1 !important }
 /* nbconvert's colours, dark enough for small type on grey: 4.5 to 1 and more */
 .highlight .o, .highlight .ow { color: #8414c8 !important }
@@ -62,7 +65,6 @@ img { max-width: 100% }
 .highlight .mi, .highlight .mf { color: #007000 !important }
 @media print {
   nav, iframe { display: none !important }
-  pre { white-space: pre-wrap !important; overflow-wrap: anywhere }
   .jp-InputArea-editor, .jp-OutputArea-output { overflow: visible !important }
   figure, img, tr { break-inside: avoid }
   h1, h2, h3 { break-after: avoid }

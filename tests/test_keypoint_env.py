@@ -11,7 +11,7 @@ from gymnasium.utils.env_checker import check_env
 import tasks
 from lbw_minimal.training import InputError
 
-README = (Path(__file__).resolve().parent.parent / "README.md").read_text()
+README = (Path(__file__).resolve().parent.parent / "tasks" / "README.md").read_text()
 K = 5
 
 
