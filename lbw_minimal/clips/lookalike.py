@@ -63,9 +63,10 @@ def look_alike(frames: np.ndarray, pixels: np.ndarray, seed: int = 0) -> LookAli
 
 def _seen(frame, rng):
     # Beyond the film's edge its last pixels go on, the arm and the table with them.
-    how = {"flags": cv2.INTER_CUBIC, "borderMode": cv2.BORDER_REPLICATE}
     edge = PLACE + np.outer(PLACE[:, :2].sum(1) - 1, [0, 0, 0.5])  # OpenCV counts from the centre
-    large = cv2.warpAffine(frame, edge, (WIDTH, HEIGHT), **how).astype(float)
+    large = cv2.warpAffine(
+        frame, edge, (WIDTH, HEIGHT), flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE
+    ).astype(float)
     light = 1 + rng.normal(0, FLICKER)
     noisy = large * (light * TINT) + rng.normal(0, NOISE, large.shape)
     return np.clip(noisy, 0, 255).astype(np.uint8)
