@@ -60,7 +60,7 @@ class Mistake:
     edits: list[tuple[str, str]]
 
 
-@dataclass
+@dataclass(eq=False)
 class Exercise:
     """See the module's text. probe: code that defines `probe(*args)`, how the answer is called."""
 
@@ -77,7 +77,7 @@ class Exercise:
     def points(self) -> float:
         return sum(check.points for check in self.checks)
 
-    @property
+    @functools.cached_property
     def gives(self) -> set[str]:
         """Functions and classes among what is given."""
         kinds = ast.FunctionDef | ast.ClassDef

@@ -6,6 +6,8 @@ else's (`call`): the notebook calls its own function, the grader a process it do
 
 from __future__ import annotations
 
+import functools
+import threading
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
@@ -17,6 +19,7 @@ from tests.grade.sandbox import Lost
 
 OPEN = ("NotImplementedError", "StillOpen")  # what an untouched exercise raises
 UNDONE = "not done yet"
+ALONE = threading.RLock()  # torch has one generator of random numbers for all threads
 CHANGES = "it changes its inputs: work on a copy"
 
 
@@ -87,14 +90,15 @@ def judge(exercise: Exercise, call, seed: int = 0, renew=None) -> Result:
     nothing, also where it happens to be right; nor does one that hangs on what it was asked before.
     The order of the questions hangs on the seed, so that counting them helps nobody.
     """
-    checks, reference = exercise.checks, exercise.run(exercise.source)
+    checks = exercise.checks
     said, left, lost = [""] * len(checks), [c.trials for c in checks], ""
     asked = []
-    for i, args in _questions(exercise, seed):
+    for question in questions(exercise, seed):
+        i = question.check
         if said[i] == UNDONE:
             continue
         try:
-            got, changed = call(args)
+            got, changed = call(question.args)
         except Lost as e:
             lost = str(e)
             break
@@ -102,7 +106,7 @@ def judge(exercise: Exercise, call, seed: int = 0, renew=None) -> Result:
         if type(got) is Raised and got in OPEN:
             said[i] = UNDONE
             continue
-        asked.append(Asked(checks[i], args, got, reference(args)))
+        asked.append(Asked(checks[i], question, got))
         said[i] = said[i] or asked[-1].message or (CHANGES if changed else "")
     if all(message == UNDONE for message in said):
         return nothing(exercise, UNDONE, open=True)
@@ -121,18 +125,44 @@ def judge(exercise: Exercise, call, seed: int = 0, renew=None) -> Result:
     return result
 
 
+@dataclass(eq=False)
+class Question:
+    """The number of a check, inputs, the right answer, and those of mistakes by their numbers."""
+
+    check: int
+    args: tuple
+    want: object
+    theirs: dict[int, object] = field(default_factory=dict)
+
+
 @dataclass
 class Asked:
-    """A question, the answer, the right one, and what to say of it: nothing if it is right."""
+    """A question, the answer, and what to say of it: nothing if it is right."""
 
     check: Check
-    args: tuple
+    question: Question
     got: object
-    want: object
     message: str = ""
 
     def __post_init__(self):
-        self.message = _message(self.check, self.got, self.want, self.args)
+        self.message = _message(self.check, self.got, self.question)
+
+
+def questions(exercise: Exercise, seed: int) -> list[Question]:
+    """An exercise's questions in an order that hangs on the seed, worked out once for a class."""
+    with ALONE:
+        return _worked_out(exercise, seed)
+
+
+def forget() -> None:
+    """Work the questions out anew: a notebook's cell may have changed what they are made with."""
+    _worked_out.cache_clear()
+
+
+@functools.lru_cache(maxsize=100)  # a class asks those of one seed, and there are 50 exercises
+def _worked_out(exercise: Exercise, seed: int) -> list[Question]:
+    right = exercise.run(exercise.source)
+    return [Question(i, args, right(args)) for i, args in _questions(exercise, seed)]
 
 
 def _questions(exercise: Exercise, seed: int):
@@ -143,21 +173,37 @@ def _questions(exercise: Exercise, seed: int):
         yield int(i), exercise.checks[i].inputs(sources[i])
 
 
+def _theirs(exercise: Exercise, mistake: int, question: Question):
+    """What an answer with a mistake, by its number, says to a question."""
+    if mistake not in question.theirs:
+        with ALONE:
+            question.theirs[mistake] = _mistaken(exercise, mistake)(question.args)
+    return question.theirs[mistake]
+
+
+@functools.lru_cache(maxsize=1000)
+def _mistaken(exercise: Exercise, mistake: int) -> Callable:
+    return exercise.run(exercise.wrong(exercise.mistakes[mistake]))
+
+
 def _hint(exercise: Exercise, asked: list[Asked]) -> str:
     """That of the anticipated mistake that answers as the student does, wherever it was asked.
 
     One that agrees on part of the questions alone happens to give the same there.
     """
     wrong = [a for a in asked if a.message]
-    for mistake in exercise.mistakes if wrong else ():
-        theirs = exercise.run(exercise.wrong(mistake))
-        if all(_same(a, theirs(a.args)) for a in [*wrong, *(a for a in asked if not a.message)]):
+    asked = [*wrong, *(a for a in asked if not a.message)]
+    for number, mistake in enumerate(exercise.mistakes if wrong else ()):
+        if all(_same(a, _theirs(exercise, number, a.question)) for a in asked):
             return mistake.hint
     return ""
 
 
-def _message(check: Check, got, want, args) -> str:
-    wrong = check.verify(got, args) if check.verify else different(got, want, check)
+def _message(check: Check, got, question: Question) -> str:
+    if check.verify:
+        wrong = check.verify(got, question.args)
+    else:
+        wrong = different(got, question.want, check)
     if not wrong:
         return ""
     if type(got) is Raised and got == "ImportError" and "your own lines" in got.text:
@@ -177,7 +223,7 @@ def _same(asked: Asked, theirs) -> bool:
         return False
     if different(asked.got, theirs, asked.check):
         return False
-    return not asked.message or bool(_message(asked.check, theirs, asked.want, asked.args))
+    return not asked.message or bool(_message(asked.check, theirs, asked.question))
 
 
 EXACT = Check("", lambda rng: (), 0, 1e-6, 1e-6, 1, None)
@@ -191,11 +237,11 @@ def _all_same(values) -> bool:
 
 def _doubt(asked: list[Asked], call, renew) -> str:
     """Why right answers earn nothing; empty if they do."""
-    if _all_same([a.got for a in asked]) and not _all_same([a.want for a in asked]):
+    if _all_same([a.got for a in asked]) and not _all_same([a.question.want for a in asked]):
         return "it returns the same, whatever it is given"
     known = {}
     for a in asked:
-        known.setdefault(id(a.check), (a.args, a.got))
+        known.setdefault(id(a.check), (a.question.args, a.got))
     return _repeat(list(known.values()), call, renew)
 
 

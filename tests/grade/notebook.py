@@ -13,7 +13,7 @@ from types import ModuleType
 from tests.grade.cell.answer import FORBIDDEN, PREAMBLE, Hidden, ask, explained, own_lines
 from tests.grade.cell.wire import decode, encode
 from tests.grade.exercise import Exercise, find
-from tests.grade.judge import Result, best, judge
+from tests.grade.judge import Result, best, forget, judge
 from tests.grade.sandbox import WALL
 
 
@@ -45,6 +45,7 @@ def check(id: str, seed: int = 0) -> Points:
         raise StillOpen(
             f"Exercise {id}: {exercise.name} is the package's own; write it with your own lines."
         )
+    forget()
     own = exercise.gives & set(space)
     ways = [here(exercise, space, over) for over in ((True, False) if own else (True,))]
     result = best(lambda call=call: judge(exercise, call, seed) for call in ways)

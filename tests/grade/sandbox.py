@@ -29,6 +29,13 @@ from tests.grade.exercise import Exercise
 CELL = Path(__file__).resolve().parent / "cell"
 SYSTEM = ("/usr", "/lib", "/lib64", "/bin", "/etc/ld.so.cache", "/etc/alternatives")
 DEVICES = ("/dev/null", "/dev/zero", "/dev/random", "/dev/urandom")
+ENVIRONMENT = {
+    "OMP_NUM_THREADS": "1",
+    # Memory of the kind that forks cheaply, and that a process keeps once it has it: a world of
+    # PyBullet takes and gives back 12 MB.
+    "GLIBC_TUNABLES": "glibc.malloc.hugetlb=1:glibc.malloc.mmap_threshold=33554432:"
+    "glibc.malloc.trim_threshold=268435456",
+}
 MEMORY = 2 << 30  # bytes a student's code may take
 CPU = 10  # s of processor time for one exercise
 WALL = 15  # s for one call, asleep or not
@@ -131,10 +138,11 @@ def _inside(bwrap: str) -> list[str]:
     """How to start a program inside bubblewrap."""
     binds = [x for path in SYSTEM for x in ("--ro-bind-try", path, path)]
     binds += [x for path in _readable() for x in ("--ro-bind", path, path)]
+    variables = [x for pair in ENVIRONMENT.items() for x in ("--setenv", *pair)]
     return [
         bwrap, "--unshare-all", "--die-with-parent", "--new-session", "--clearenv",
         "--cap-drop", "ALL", "--size", str(8 << 20), "--tmpfs", "/tmp", *binds,
-        "--proc", "/proc", "--dev", "/dev", "--setenv", "OMP_NUM_THREADS", "1", "--chdir", "/tmp",
+        "--proc", "/proc", "--dev", "/dev", *variables, "--chdir", "/tmp",
     ]  # fmt: skip
 
 
@@ -168,7 +176,7 @@ class Sandbox:
         if self.process:
             return
         self.control, theirs = socket.socketpair()
-        env = {"OMP_NUM_THREADS": "1", "PATH": os.environ.get("PATH", "")}
+        env = ENVIRONMENT | {"PATH": os.environ.get("PATH", "")}
         with theirs, tempfile.TemporaryFile() as said:
             self.process = subprocess.Popen(
                 command(theirs.fileno()), pass_fds=[theirs.fileno()], stdin=subprocess.DEVNULL,

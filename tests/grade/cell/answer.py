@@ -7,9 +7,11 @@ import __future__
 
 import ast
 import contextlib
+import functools
 import importlib.machinery
 import signal
 import time
+from types import CodeType
 
 if __package__:
     from tests.grade.cell import wire
@@ -127,6 +129,38 @@ def _is_bare(body) -> bool:
 STUB_TEXT = ast.unparse(ast.parse(STUB))
 
 
+class Statement:
+    """A statement of a cell, looked at once. flags: of the cell's imports from __future__."""
+
+    def __init__(self, node, label: str, flags: int):
+        self.node, self.label, self.flags = node, label, flags
+        self.stub, self.quiet = is_stub(node), quiet(node)
+
+    @functools.cached_property
+    def code(self) -> CodeType:
+        """Raises SyntaxError for what parses and means nothing, such as a lone return."""
+        tree = ast.Module([self.node], [])
+        return compile(tree, self.label, "exec", self.flags, dont_inherit=True)
+
+
+@functools.lru_cache(maxsize=1000)
+def statements(source: str, label: str = "another cell") -> list[Statement]:
+    """Those of a cell. Raises SyntaxError."""
+    tree, flags = ast.parse(source, label), 0
+    for node in tree.body:
+        if isinstance(node, ast.ImportFrom) and node.module == "__future__":
+            for alias in node.names:
+                flags |= FUTURE.get(alias.name, 0)
+    return [Statement(node, label, flags) for node in tree.body]
+
+
+def learn(source: str) -> None:
+    """Compile what a cell of the course defines, so that processes forked from here need not."""
+    for statement in statements(source):
+        if statement.quiet and not statement.stub:
+            statement.code  # noqa: B018
+
+
 # From cells to names
 
 
@@ -155,34 +189,29 @@ class Cells:
 
     def run(self, source: str, definitions_only: bool = False, label: str = "another cell") -> None:
         """Run a cell but for stubs, or only its definitions. Raises SyntaxError."""
-        tree = ast.parse(source, label)
-        flags = 0
-        for node in tree.body:
-            if isinstance(node, ast.ImportFrom) and node.module == "__future__":
-                for alias in node.names:
-                    flags |= FUTURE.get(alias.name, 0)
+        found = statements(source, label)
         self.failed, seconds = None, max(0.2, min(CELL, self.left))
         definitions_only |= self.definitions_only or self.left <= 0
         before = time.process_time()
-        for node in tree.body:
-            if is_stub(node) or (definitions_only and not quiet(node)):
+        for statement in found:
+            if statement.stub or (definitions_only and not statement.quiet):
                 continue
-            left = seconds - (time.process_time() - before)
-            self._statement(node, label, flags, left, quiet(node))
+            self._statement(statement, seconds - (time.process_time() - before))
         if label == "another cell":
             self.left -= time.process_time() - before
 
-    def _statement(self, node, label, flags, seconds, defines):
-        code = compile(ast.Module([node], []), label, "exec", flags, dont_inherit=True)
+    def _statement(self, statement: Statement, seconds: float):
+        code = statement.code
         try:
-            if seconds <= 0 and not defines:
+            if seconds <= 0 and not statement.quiet:
                 raise TooLong
             with within(max(seconds, 0.2)):
                 exec(code, self.names)
         except TooLong:
-            self._lost(node, TimeoutError(f"it ran for more than {CELL:g} s, and was left out"))
+            why = TimeoutError(f"it ran for more than {CELL:g} s, and was left out")
+            self._lost(statement.node, why)
         except BaseException as e:
-            self._lost(node, e)
+            self._lost(statement.node, e)
 
     def _lost(self, node, e):
         """Remember why; where a missing name was the reason, the reason why that one is missing."""

@@ -8,6 +8,7 @@ page: setrlimit(2), capset(2), landlock(7), seccomp(2), seccomp_unotify(2).
 import contextlib
 import ctypes
 import errno
+import functools
 import os
 import signal
 import socket
@@ -16,12 +17,12 @@ import struct
 THREADS = 64  # of one process; a library that counts the cores of a large machine may want these
 
 
-def confine(memory: int, cpu: int, readable: list[str], above: socket.socket) -> None:
+def confine(memory: int, cpu: int, files: int | None, above: socket.socket) -> None:
     """Limit this process for good.
 
-    memory: bytes beyond what it has now. cpu: seconds. readable: paths. above: the process that
-    counts threads, see `count_threads`; it is sent where they ask. Raises OSError where a wall does
-    not stand.
+    memory: bytes beyond what it has now. cpu: seconds. files: what `allow_files` made. above: the
+    process that counts threads, see `count_threads`; it is sent where they ask. Raises OSError
+    where a wall does not stand.
     """
     import resource  # not where a notebook's check() imports this, on Windows
 
@@ -41,19 +42,25 @@ def confine(memory: int, cpu: int, readable: list[str], above: socket.socket) ->
     _libc("prctl", 38, 1, 0, 0, 0)  # PR_SET_NO_NEW_PRIVS: what both walls below ask for first
     _libc("prctl", 1, signal.SIGKILL, 0, 0, 0)  # PR_SET_PDEATHSIG: it ends with its parent
     counted = ask_for_threads(above)
-    if has_landlock():
-        close_files(readable)
+    if files is not None:
+        _libc("syscall", RESTRICT_SELF, files, 0)
+        os.close(files)
     filter_calls(counted)
 
 
 def _libc(name: str, *args) -> int:
     """A function of libc by name; integers pass as longs. Raises OSError."""
-    function = getattr(ctypes.CDLL(None, use_errno=True), name)
-    function.restype = ctypes.c_long
-    result = function(*(ctypes.c_long(a) if isinstance(a, int) else a for a in args))
+    result = _function(name)(*(ctypes.c_long(a) if isinstance(a, int) else a for a in args))
     if result < 0:
         raise OSError(ctypes.get_errno(), f"{name}: {os.strerror(ctypes.get_errno())}")
     return result
+
+
+@functools.cache
+def _function(name: str):
+    function = getattr(ctypes.CDLL(None, use_errno=True), name)
+    function.restype = ctypes.c_long
+    return function
 
 
 CREATE_RULESET, ADD_RULE, RESTRICT_SELF = 444, 445, 446
@@ -68,8 +75,11 @@ def has_landlock() -> bool:
     return False
 
 
-def close_files(readable: list[str]) -> None:
-    """No file opens any more but those at or below the `readable` paths, to be read: Landlock."""
+def allow_files(readable: list[str]) -> int | None:
+    """A file that stands for Landlock's rules: no file opens but those at or below the `readable`
+    paths, to be read. Made once, for all processes to come; None where there is no Landlock."""
+    if not has_landlock():
+        return None
     handled = ctypes.c_uint64(EVERY_ACCESS)
     rules = _libc("syscall", CREATE_RULESET, ctypes.byref(handled), 8, 0)
     for path in filter(os.path.exists, readable):
@@ -78,8 +88,7 @@ def close_files(readable: list[str]) -> None:
         rule = ctypes.create_string_buffer(struct.pack("=Qi", access, place), 12)
         _libc("syscall", ADD_RULE, rules, 1, rule, 0)  # 1: what lies beneath a path
         os.close(place)
-    _libc("syscall", RESTRICT_SELF, rules, 0)
-    os.close(rules)
+    return rules
 
 
 # Calls that are allowed, by their numbers on x86_64 and aarch64, -1 where there is none. They
@@ -141,6 +150,14 @@ def _where(call: tuple[int, int], lines: list) -> list:
 
 def filter_calls(threads: bool) -> None:
     """Allow the calls above and no other: seccomp. threads: whether new ones are counted."""
+    before, after = allowed(threads)
+    itself = [_only(call, 0, (os.getpid(),)) for call in (KILL, TGKILL)]  # not 0 or -1, many
+    _seccomp(before + _code(sum(itself, [])) + after, 0)
+
+
+@functools.cache  # filled before the fork: all but a process's own number is the same for all
+def allowed(threads: bool) -> tuple[bytes, bytes]:
+    """The filter but for the lines on signals, which stand between these two pieces."""
     machine = os.uname().machine
     if machine not in COLUMN:
         raise OSError(f"seccomp: the calls of {machine} are not known here, only {[*COLUMN]}")
@@ -153,21 +170,21 @@ def filter_calls(threads: bool) -> None:
         judged = [(LOAD, 0, 0, 16 + 8 * flags), (ANY_BIT, 0, 1, WRITING), *verdicts]
         program += _where(call, judged)
     program += _only(FCNTL, 1, DUPLICATE) + _only(IOCTL, 1, TERMINAL) + _only(PRCTL, 0, NAMES)
-    for call in (KILL, TGKILL):  # itself; not 0 or -1, which are many
-        program += _only(call, 0, (os.getpid(),))
     mine = [(LOAD, 0, 0, 16), (EQUAL, 1, 0, 0), (RETURN, 0, 0, REFUSE)]
     reads = [line for half in (32, 36) for line in ((LOAD, 0, 0, half), *mine[1:])]  # no new limit
     program += _where(PRLIMIT, [*mine, *reads, (RETURN, 0, 0, ALLOW)])
     program += _only(CLONE, 0, (THREAD,) if threads else ())
-    program += [(AT_LEAST, 0, 1, NEWER), (RETURN, 0, 0, ERRNO | errno.ENOSYS)]
-    program += [(RETURN, 0, 0, REFUSE)]
-    _seccomp(program, 0)
+    after = [(AT_LEAST, 0, 1, NEWER), (RETURN, 0, 0, ERRNO | errno.ENOSYS), (RETURN, 0, 0, REFUSE)]
+    return _code(program), _code(after)
 
 
-def _seccomp(program: list, flags: int) -> int:
-    code = b"".join(struct.pack("<HBBI", *line) for line in program)
+def _code(program: list) -> bytes:
+    return b"".join(struct.pack("<HBBI", *line) for line in program)
+
+
+def _seccomp(code: bytes, flags: int) -> int:
     buffer = ctypes.create_string_buffer(code, len(code))
-    header = struct.pack("@HP", len(program), ctypes.addressof(buffer))
+    header = struct.pack("@HP", len(code) // 8, ctypes.addressof(buffer))
     number = {"x86_64": 317, "aarch64": 277}[os.uname().machine]
     return _libc("syscall", number, 1, flags, header)  # 1: SECCOMP_SET_MODE_FILTER
 
@@ -185,7 +202,7 @@ def ask_for_threads(above: socket.socket) -> bool:
     program = [(LOAD, 0, 0, 0), (EQUAL, 0, 1, _number(CLONE))]
     program += [(RETURN, 0, 0, NOTIFY), (RETURN, 0, 0, ALLOW)]
     try:
-        listener = _seccomp(program, NEW_LISTENER)
+        listener = _seccomp(_code(program), NEW_LISTENER)
     except OSError:
         return False
     socket.send_fds(above, [b"t"], [listener])

@@ -7,6 +7,7 @@ judge has seen enough of it.
 """
 
 import gc
+import importlib
 import io
 import os
 import select
@@ -19,6 +20,9 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 import answer
 import walls
 import wire
+
+# What answers import, and what is slow to import or read on demand: all before the fork.
+USED = ("fcntl", "gymnasium", "numpy.ma", "numpy.random", "pybullet", "resource")
 
 del sys.modules["wire"]  # a cell that patches what it finds there patches nothing of ours
 
@@ -63,11 +67,13 @@ def main(fd: int, readable: list[str]) -> None:
     """
     control = socket.socket(fileno=fd)
     exec(answer.PREAMBLE, space := {})
-    import gymnasium  # noqa: F401 (imported before the fork, for speed)
-    import pybullet  # noqa: F401
-
+    for name in USED:
+        importlib.import_module(name)
     space["torch"].set_num_threads(1)
     sys.meta_path[:0] = [answer.Hidden(), answer.Drawing()]
+    files = walls.allow_files(readable)
+    for threads in (True, False):
+        walls.allowed(threads)
     gc.freeze()  # or each fork's collector would write to, and so copy, all that is loaded here
     wire.send(control, b"ready")
     while True:
@@ -75,6 +81,9 @@ def main(fd: int, readable: list[str]) -> None:
             job = wire.decode(wire.receive(control))
         except EOFError:
             return
+        for source, course in (*job["helpers"], *job["below"]):
+            if course:
+                answer.learn(source)
         theirs, ours = socket.socketpair()
         below, above = socket.socketpair()
         socket.send_fds(control, [b"."], [theirs.fileno()])
@@ -82,7 +91,7 @@ def main(fd: int, readable: list[str]) -> None:
         if pid == 0:
             for other in (control, theirs, below):
                 other.close()
-            serve(job, ours, above, readable)
+            serve(job, ours, above, files)
         for other in (theirs, ours, above):
             other.close()
         attend(control, below, pid)
@@ -116,8 +125,8 @@ def attend(control, below, pid: int) -> None:
             os.close(listener)
 
 
-def serve(job: dict, channel, above, readable: list[str]) -> None:
-    """One exercise, in a process of its own. Never returns."""
+def serve(job: dict, channel, above, files: int | None) -> None:
+    """One exercise, in a process of its own, with Landlock's rules in `files`. Never returns."""
     try:
         os.chdir("/")
         sys.stdin = io.StringIO()
@@ -125,11 +134,12 @@ def serve(job: dict, channel, above, readable: list[str]) -> None:
         for place in (0, 1, 2):
             os.dup2(silence, place)
         first = 3
-        for kept in sorted((channel.fileno(), above.fileno())):
+        rules = [] if files is None else [files]
+        for kept in sorted((channel.fileno(), above.fileno(), *rules)):
             os.closerange(first, kept)
             first = kept + 1
         os.closerange(first, 1 << 20)
-        walls.confine(job["memory"], job["cpu"], readable, above)
+        walls.confine(job["memory"], job["cpu"], files, above)
         above.close()
     except BaseException as e:  # never run a stranger's code unconfined
         wire.send(channel, wire.encode(f"unconfined: {e}"))
