@@ -10,9 +10,9 @@ import pytest
 
 from tests.grade import check
 from tests.grade.__main__ import grade_one, noted_seed
-from tests.grade.cell.answer import STUB
+from tests.grade.cell.answer import STUB, learn, statements
 from tests.grade.cell.wire import Other, decode, encode
-from tests.grade.exercise import everything, find
+from tests.grade.exercise import Exercise, everything, find
 from tests.grade.judge import judge
 from tests.grade.notebook import StillOpen, here
 from tests.grade.sandbox import Sandbox
@@ -233,6 +233,24 @@ def test_a_check_leaves_the_notebook_as_it_was(capsys):
     before = dict(space)
     exec('check("6.3")', space)
     assert space == before and "3 of 3" in capsys.readouterr().out
+
+
+def test_a_cell_of_the_course_is_compiled_once_for_all_processes():
+    learn(source := "import math\nx = math.pi\ndef f():\n    return x\nprint(f())")
+    found = statements(source)
+    assert found is statements(source)
+    assert ["code" in vars(s) for s in found] == [True, True, True, False]  # it is not run
+
+
+def test_a_check_asks_anew_what_is_right(monkeypatch, capsys):
+    """A cell may have changed what the reference is made with, such as torch's default type."""
+    ran, run = [], Exercise.run
+    monkeypatch.setattr(
+        Exercise, "run", lambda self, source: ran.append(source) or run(self, source)
+    )
+    for _ in range(2):
+        exec(f"import numpy as np\n{find('6.1').source}\ncheck('6.1')", {"check": check})
+    assert ran == 2 * [find("6.1").source]
 
 
 @pytest.mark.parametrize("id", ALL)

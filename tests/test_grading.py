@@ -6,6 +6,7 @@ with exercise 6.1 answered in one of many bad ways.
 
 import copy
 import csv
+import functools
 import json
 import os
 import re
@@ -21,11 +22,12 @@ import numpy as np
 import pytest
 
 import tests.grade.__main__ as grading
+from tests.grade import judge as judging
 from tests.grade import sandbox
 from tests.grade.__main__ import main, safe
 from tests.grade.cell.answer import STUB
 from tests.grade.cell.walls import has_landlock
-from tests.grade.exercise import find
+from tests.grade.exercise import Exercise, find
 from tests.grade.judge import _questions
 from tests.grade.sandbox import Sandbox
 from tests.grade.submission import Answer
@@ -571,6 +573,24 @@ def test_an_answer_that_counts_its_calls_and_remembers_what_it_said_earns_nothin
         result = grading.grade_one(exercise, Answer(source, [], ""), box, seed=2)
     assert result.points == 0
     assert "after other inputs" in " ".join(result.lines())
+
+
+def test_what_the_judge_works_out_is_worked_out_once_for_a_class(monkeypatch):
+    """References and mistakes: they hang on the seed, not on who is graded."""
+    monkeypatch.setattr(judging, "_mistaken", functools.cache(judging._mistaken.__wrapped__))
+    judging.forget()
+    wrong = E61.run(E61.wrong(E61.mistakes[3]))
+    ran, run = [], Exercise.run
+
+    def counted(exercise, source):
+        ran.append(source)
+        return run(exercise, source)
+
+    monkeypatch.setattr(Exercise, "run", counted)
+    first = judging.judge(E61, lambda args: (wrong(args), False), 5)
+    assert ran == [E61.source, *map(E61.wrong, E61.mistakes[:4])]
+    assert judging.judge(E61, lambda args: (wrong(args), False), 5) == first
+    assert len(ran) == 5
 
 
 def test_one_open_case_costs_its_own_checks_only():

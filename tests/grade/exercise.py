@@ -278,8 +278,10 @@ def _different_numbers(got, want, check):
         return f"its values are {got.dtype}; expected {want.dtype}"
     if not np.isfinite(got).all() and np.isfinite(want).all():
         return "it contains NaN or infinity"
+    if (got == want).all():  # most right answers, and faster than isclose
+        return None
     if got.dtype.kind == "b":
-        return None if (got == want).all() else "some of its truth values are wrong"
+        return "some of its truth values are wrong"
     close = np.isclose(got, want, atol=check.atol, rtol=check.rtol, equal_nan=True)
     if close.all():
         return None

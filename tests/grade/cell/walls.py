@@ -151,8 +151,8 @@ def _where(call: tuple[int, int], lines: list) -> list:
 def filter_calls(threads: bool) -> None:
     """Allow the calls above and no other: seccomp. threads: whether new ones are counted."""
     before, after = allowed(threads)
-    itself = [_only(call, 0, (os.getpid(),)) for call in (KILL, TGKILL)]  # not 0 or -1, many
-    _seccomp(before + _code(sum(itself, [])) + after, 0)
+    own = (os.getpid(),)  # not 0 or -1, which are many
+    _seccomp(before + _code(_only(KILL, 0, own) + _only(TGKILL, 0, own)) + after, 0)
 
 
 @functools.cache  # filled before the fork: all but a process's own number is the same for all

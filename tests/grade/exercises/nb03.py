@@ -138,7 +138,7 @@ def make_push(client):
 
 
 def _speed(rng, ask):
-    return float(rng.uniform(0.3, 0.6)), int(rng.integers(1, 4)), ask
+    return float(rng.uniform(0.3, 0.6)), int(rng.integers(1, 3)), ask
 
 
 make_push.check(

@@ -67,7 +67,7 @@ def make_drawer(client, friction):
 def _push(rng, least, most, seconds):
     friction = float(rng.uniform(12, 24))
     force = friction + float(rng.uniform(least, most))
-    return force, friction, seconds, int(rng.integers(1, 4))
+    return force, friction, seconds, int(rng.integers(1, 3))
 
 
 make_drawer.check(
