@@ -1,8 +1,10 @@
-"""A phone's HDR picture on an ordinary screen: from HLG or PQ with BT.2020 colours to sRGB.
+"""A phone's HDR picture on an ordinary screen: from HLG or PQ with BT.2020 colours to BT.709.
 
-    signal -> `screen_light`, in BT.709 colours -> `tone_map`, which rolls highlights off -> sRGB
+    signal -> `screen_light`, in BT.709 colours -> `tone_map`, which rolls highlights off -> signal
 
-Light is counted in units of 100 cd/m2, which is the white of an SDR screen.
+Light is counted in units of 100 cd/m2, which is the white of an SDR screen. What comes out is the
+signal that an SDR film would have for that light, as those films' own signals are left as they are:
+BT.1886, a power of 2.4. By sRGB's curve it would be 3 to 8 of 255 darker.
 """
 
 from __future__ import annotations
@@ -12,7 +14,7 @@ import numpy as np
 HLG, PQ = 18, 16  # the two transfer functions, as ITU-T H.273 counts them in a file
 PEAK = 10.0  # 1000 cd/m2, the nominal peak of HLG (BT.2100) and of most PQ films
 WHITE = 2.03  # 203 cd/m2, a white sheet of paper in HDR (BT.2408)
-KNEE = 0.5  # of white: below it greys stay as they are; white itself becomes 226, the peak 255
+KNEE = 0.5  # of white: below it greys stay as they are; white itself becomes 227, the peak 255
 # BT.2020's linear RGB in BT.709's primaries (BT.2087, rounded to four digits there).
 TO_BT709 = np.array(
     [[1.6605, -0.5876, -0.0728], [-0.1246, 1.1329, -0.0083], [-0.0182, -0.1006, 1.1187]],
@@ -45,11 +47,11 @@ def white_of(light: np.ndarray) -> float:
 
 
 def tone_map(light: np.ndarray, white: float) -> np.ndarray:
-    """sRGB (..., 3) uint8 of light (..., 3) float32, linear BT.709 RGB."""
+    """SDR's R'G'B' (..., 3) uint8 of light (..., 3) float32, linear BT.709 RGB."""
     light = light / white
     brightest = np.clip(light.max(axis=-1, keepdims=True), 1e-6, PEAK / white)
     light *= _roll_off(brightest, PEAK / white) / brightest  # all three alike keep the hue
-    return _SRGB[np.rint(np.clip(light, 0, 1) * (len(_SRGB) - 1)).astype(np.int32)]
+    return _SDR[np.rint(np.clip(light, 0, 1) * (len(_SDR) - 1)).astype(np.int32)]
 
 
 def hlg_scene(signal: np.ndarray) -> np.ndarray:
@@ -66,9 +68,9 @@ def pq_light(signal: np.ndarray) -> np.ndarray:
     return 100 * (np.maximum(power - c1, 0) / (c2 - c3 * power)) ** (1 / m1)
 
 
-def srgb_signal(light: np.ndarray) -> np.ndarray:
-    """The sRGB signal in [0, 1] of linear light in [0, 1] (IEC 61966-2-1)."""
-    return np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
+def sdr_signal(light: np.ndarray) -> np.ndarray:
+    """The SDR signal in [0, 1] of linear light in [0, 1], the inverse EOTF of BT.1886."""
+    return light ** (1 / 2.4)
 
 
 def _roll_off(x, peak):
@@ -83,4 +85,4 @@ _CODES = np.arange(65536) / 65535
 _HLG_SCENE = hlg_scene(_CODES).astype(np.float32)
 _PQ_LIGHT = pq_light(_CODES).astype(np.float32)
 # So fine that no grey level is skipped where the curve is steepest, near black.
-_SRGB = np.rint(255 * srgb_signal(np.arange(16384) / 16383)).astype(np.uint8)
+_SDR = np.rint(255 * sdr_signal(np.arange(1 << 20) / ((1 << 20) - 1))).astype(np.uint8)

@@ -32,7 +32,7 @@ CAPTURED = "com.android.capture.fps"  # how many frames a second the camera took
 class Clip:
     """What a clip shows, and what was done to show it."""
 
-    frames: np.ndarray  # (T, H, W, 3) uint8 sRGB, T >= 2, the longer side at most SIDE
+    frames: np.ndarray  # (T, H, W, 3) uint8 RGB, T >= 2, the longer side at most SIDE
     times: np.ndarray  # (T,) float64 seconds, strictly rising from 0
     cuts: list[int]  # indices of the frames that do not continue the one before
     notes: list[str]  # what was done, a sentence each

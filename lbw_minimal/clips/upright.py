@@ -21,7 +21,7 @@ WHOLE = (0.0, 1.0, 0.0, 1.0)
 
 
 class Upright:
-    """Turns frames of a stream into pictures (H, W, 3) uint8 sRGB, the longer side at most SIDE.
+    """Turns frames of a stream into pictures (H, W, 3) uint8 RGB, the longer side at most SIDE.
 
     turn: degrees clockwise, 0, 90, 180 or 270; None does what the file asks for. window: top,
     bottom, left and right of what is kept, as shares of the upright picture. `notes` says what was
