@@ -17,7 +17,7 @@ push reach: $(VENV)/ready
 	$(BIN)/python -m tasks $@
 
 test: $(VENV)/ready
-	@echo "The tests take about 13 minutes on two cores."
+	@echo "The tests take 6 to 13 minutes on two cores."
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from lbw_minimal.training import InputError
 
 # (lambda_r1, lambda_r2); the paper names neither. With (1, 1) slide's pucks scatter almost twice
-# as far: see README, "What differs from the paper".
+# as far: see lbw_minimal/README.md, "What differs".
 LAMBDA = (1.0, 3.0)
 LEAST_STEP = 0.1  # of the robot's median step: what moves less between two frames is at rest
 # Frames of a rest that stay, 0.2 s. Movements start and end slowly. Without these frames the robot
