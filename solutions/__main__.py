@@ -184,9 +184,8 @@ def page(notebook: nbformat.NotebookNode, source: Path) -> str:
                 output.text, output.name = re.sub(r"[^\n]*\r", "", output.text), "stdout"
             if GREETING.fullmatch(output.get("text", "")):
                 cell.outputs.remove(output)
-            if png := output.get("data", {}).get(
-                "image/png"
-            ):  # nbconvert would leave out its words
+            # nbconvert would leave out a picture's words
+            if png := output.get("data", {}).get("image/png"):
                 said = output.metadata.get("image/png", {}).get("alt", "")
                 uri = f"data:image/png;base64,{''.join(png.split())}"
                 output.data = {"text/html": f'<img alt="{escape(said)}" src="{uri}">'}

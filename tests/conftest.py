@@ -23,14 +23,11 @@ def pytest_collection_modifyitems(items):
 
 # The archive for students has no solved notebooks, and these tests are of them.
 if not any((Path(__file__).parent.parent / "solutions").glob("*.ipynb")):
-    collect_ignore = ["test_answers.py", "test_cluster.py", "test_grading.py", "test_nbgrader.py"]
-    collect_ignore += [
-        "test_archive.py",
-        "test_grading_files.py",
-        "test_pages.py",
-        "test_notebooks.py",
+    collect_ignore = [
+        "test_answers.py", "test_archive.py", "test_cluster.py", "test_grading.py",
+        "test_grading_files.py", "test_nbgrader.py", "test_notebooks.py", "test_pages.py",
         "test_systems.py",
-    ]
+    ]  # fmt: skip
 
 
 @pytest.fixture(autouse=True)

@@ -9,6 +9,8 @@ BT.1886, a power of 2.4. By sRGB's curve it would be 3 to 8 of 255 darker.
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 HLG, PQ = 18, 16  # the two transfer functions, as ITU-T H.273 counts them in a file
@@ -51,7 +53,8 @@ def tone_map(light: np.ndarray, white: float) -> np.ndarray:
     light = light / white
     brightest = np.clip(light.max(axis=-1, keepdims=True), 1e-6, PEAK / white)
     light *= _roll_off(brightest, PEAK / white) / brightest  # all three alike keep the hue
-    return _SDR[np.rint(np.clip(light, 0, 1) * (len(_SDR) - 1)).astype(np.int32)]
+    table = _sdr()
+    return table[np.rint(np.clip(light, 0, 1) * (len(table) - 1)).astype(np.int32)]
 
 
 def hlg_scene(signal: np.ndarray) -> np.ndarray:
@@ -84,5 +87,9 @@ def _roll_off(x, peak):
 _CODES = np.arange(65536) / 65535
 _HLG_SCENE = hlg_scene(_CODES).astype(np.float32)
 _PQ_LIGHT = pq_light(_CODES).astype(np.float32)
-# So fine that no grey level is skipped where the curve is steepest, near black.
-_SDR = np.rint(255 * sdr_signal(np.arange(1 << 20) / ((1 << 20) - 1))).astype(np.uint8)
+
+
+@functools.cache  # for the first HDR film: few are, and it takes longer than the other tables
+def _sdr() -> np.ndarray:
+    """8-bit signals, so fine that near black, where the curve is steepest, no level is skipped."""
+    return np.rint(255 * sdr_signal(np.linspace(0, 1, 1 << 20))).astype(np.uint8)

@@ -18,18 +18,16 @@ import av
 import cv2
 import numpy as np
 
-FPS = 25  # of the film
+from lbw_minimal.clips.retarget import FPS
+
 WIDTH, HEIGHT = 320, 240  # pixels
 # A pixel of the film in the clip: mirrored, 3.1 times as large, and the table not quite level.
 PLACE = np.array([[-3.1, 0.12, 305.0], [0.10, 3.1, -15.0]])
 TINT = np.array([1.06, 1.0, 0.9])  # of red, green and blue: a lamp at home
 FLICKER, NOISE = 0.03, 4.0  # share of the light, grey levels
 PACE = 0.7  # times the film's speed
-RATE, UNEVEN, LOST = (
-    15,
-    0.4,
-    0.1,
-)  # frames a second; share of a step; share of frames that never came
+RATE = 15  # frames a second
+UNEVEN, LOST = 0.4, 0.1  # share of a step; share of frames that never came
 BEFORE = 0.4  # s of rest in front
 
 

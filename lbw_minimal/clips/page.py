@@ -135,12 +135,17 @@ def write_page(
     write_atomic(path, HTML.format(title=title, css=CSS + STRIP, body="".join(page)))
 
 
+def nearest(times: np.ndarray, t: float) -> int:
+    """The index of the one of times (T,) that is nearest to t, all in s."""
+    return int(np.abs(times - t).argmin())
+
+
 def clip_frames(frames: np.ndarray, times: np.ndarray, tracks: Tracks) -> str:
     """Frames of the clip with tip and object drawn on them, which know where they are clicked."""
     figures = []
     for i in spread(len(tracks.times), FRAMES):
         t = tracks.times[i]
-        frame = frames[int(np.abs(times - t).argmin())]
+        frame = frames[nearest(times, t)]
         image = cv2.imencode(".webp", _drawn(frame, tracks, i)[..., ::-1])[1].tobytes()
         size = f'data-width="{frame.shape[1]}" data-height="{frame.shape[0]}"'
         caption = f"{t:.2f} s; sure: {tracks.tip_sure[i]:.0%}, {tracks.object_sure[i]:.0%}"
@@ -174,10 +179,8 @@ def _clip_column(frames, times, tracks, motion, shown):
         if motion is not None:  # after its end, as after a hit, the clip goes on
             t = motion.times[min(k, len(motion.times) - 1)]
             t += max(0, k + 1 - len(motion.times)) / FPS
-        frame = frames[int(np.abs(times - t).argmin())]
-        small = _drawn(
-            frame, tracks, 0 if tracks is None else int(np.abs(tracks.times - t).argmin())
-        )
+        frame = frames[nearest(times, t)]
+        small = _drawn(frame, tracks, 0 if tracks is None else nearest(tracks.times, t))
         if motion is not None and motion.mirrored:
             small = small[:, ::-1]
         scale = S / max(small.shape[:2])

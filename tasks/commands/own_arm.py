@@ -15,6 +15,7 @@ import numpy as np
 import tasks
 from lbw_minimal import imitate
 from lbw_minimal.clips.lookalike import look_alike, write
+from lbw_minimal.clips.page import nearest
 from lbw_minimal.pictures import draw_keypoints, enlarge, picture, png, spread
 from tasks.commands.prepare import Prepared, prepare
 from tasks.world import record_expert
@@ -49,7 +50,7 @@ def columns(clip: Prepared, n: int = 8) -> list[tuple[float, np.ndarray]]:
     seen = draw_keypoints(robot, perception.detect(robot), SCALE)
     out = []
     for step, moment, *below in zip(steps, moments, enlarge(again, SCALE), seen, strict=True):
-        frame = clip.clip.frames[int(np.abs(clip.clip.times - moment).argmin())]
+        frame = clip.clip.frames[nearest(clip.clip.times, moment)]
         size = width, round(width * frame.shape[0] / frame.shape[1])
         above = cv2.resize(frame, size, interpolation=cv2.INTER_AREA)
         out.append((step / FPS, np.concatenate([above, *below])))

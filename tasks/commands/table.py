@@ -177,15 +177,15 @@ def table_two(runs: dict[tuple[str, str], list[Row]]) -> str:
 def order(runs: dict[tuple[str, str], list[Row]]) -> str:
     """Where the methods' order is not Table II's, as a list; ours counts where intervals part."""
     lines = []
+    ours_is = {1: "above", 0: "not told from", -1: "below"}
+    theirs_is = {1: "above it", 0: "equal", -1: "below it"}
     for task, (a, b) in itertools.product(tasks.TASKS, itertools.combinations(METHODS, 2)):
         (_, low_a, high_a), (_, low_b, high_b) = (rate(runs[task, change]) for change in (a, b))
         ours = (low_a > high_b) - (low_b > high_a)
         theirs = int(np.sign(TABLE_II[a][task] - TABLE_II[b][task]))
         if ours != theirs:
-            words = {1: "above", 0: "not told from", -1: "below"}
-            first, second = METHODS[a][0], METHODS[b][0]
-            there = {1: "above it", 0: "equal", -1: "below it"}[theirs]
-            lines.append(f"- {task}: {first} is {words[ours]} {second}, in the paper {there}\n")
+            here = f"{METHODS[a][0]} is {ours_is[ours]} {METHODS[b][0]}"
+            lines.append(f"- {task}: {here}, in the paper {theirs_is[theirs]}\n")
     if not lines:
         return "The methods stand in the paper's order on every task.\n"
     return "Where the methods' order is not the paper's:\n\n" + "".join(lines)
