@@ -77,6 +77,23 @@ def test_the_best_robot_is_chosen_on_other_starts_than_the_tests(monkeypatch):
     assert len(set(seeds)) == 7 and min(seeds) >= TEST_SEED + 100_000
 
 
+def test_eyes_pay_where_intervals_do_not_meet():
+    """Wilson's of 100: 95 is 89-98 %, 85 is 77-91 %, 100 is 96-100 %."""
+
+    def note(policy, blind):
+        few = dict.fromkeys(controls.BLIND, 0) | {"idle": blind}
+        success = {"the policy": policy, "its camera frozen": 99, "looks once, then replays": 99}
+        return {"task": "push", "episodes": 100, "success": {"0.005": success | few}}
+
+    def said(*args):
+        return controls.eyes_pay([note(*args)]).splitlines()
+
+    assert said(100, 85)[0] == "| of 100 | 5 mm |"
+    assert said(100, 85)[2] == "| push | eyes pay: 100 to 85 |"
+    assert said(95, 85)[2] == "| push | no: 95 to 85, idle |"
+    assert said(0, 90)[2] == "| push | no: 0 to 90, idle |"
+
+
 def test_robots_without_eyes_do_what_their_names_say():
     down = controls.down_then_along(2)
     assert [down(None, t).tolist() for t in (0, 1, 2, 9)] == [[0, 0, -1]] * 2 + [[1, 0, 0]] * 2

@@ -107,6 +107,9 @@ def test_curves_are_means_of_the_last_episodes():
     log = [{"step": 10 * (i + 1), "success": i >= 2} for i in range(4)]
     axis = figures.over_steps({"push": {"LbW": [log]}}, last=2).axes[0]
     np.testing.assert_allclose(axis.lines[0].get_ydata(), [0, 0, 0.5, 1])
+    axis = figures.over_steps({"push": {"LbW": [log, log[:1]]}}, last=8).axes[0]
+    np.testing.assert_allclose(axis.lines[0].get_xydata(), [[20, 0], [30, 1 / 3], [40, 0.5]])
+    np.testing.assert_allclose(axis.lines[1].get_xydata(), [[10, 0]])
 
 
 def test_controls_are_drawn_as_shares_with_their_interval():

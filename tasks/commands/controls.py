@@ -30,6 +30,14 @@ from tasks.commands.table import METHODS, markdown
 JITTERS = (JITTER, 0.01, 0.02, 0.04)  # m
 TRIAL_SEED, TRIALS = 2_000_000, 10  # starts on which blind robots are chosen
 LIBRARY = 50  # episodes of the policy, from which the robot that looks once takes one
+BLIND = (  # what has no eyes at all
+    "its camera grey",
+    "blind replay of its best episode",
+    "best constant action",
+    "down, then along",
+    "random actions",
+    "idle",
+)
 Robot = Callable[[np.ndarray, int], np.ndarray]  # (observation, step of the episode) -> action
 
 
@@ -246,6 +254,26 @@ def measure(
         for jitter in (JITTERS[:1] if brief else JITTERS)
     }
     return {"task": task, "episodes": episodes, "seed": seed, "success": found}
+
+
+def eyes_pay(notes: list[dict[str, Any]]) -> str:
+    """A row a task, a column a jitter, as Markdown: the policy beside the best robot without eyes.
+
+    notes: what `measure` returned, all over the same jitters. Eyes pay where the policy's 95 %
+    interval lies above that robot's.
+    """
+
+    def cell(note, jitter):
+        found, n = note["success"][jitter], note["episodes"]
+        robot = max(BLIND, key=lambda name: found[name])
+        policy, blind = found["the policy"], found[robot]
+        if wilson(policy, n)[0] > wilson(blind, n)[1]:
+            return f"eyes pay: {policy} to {blind}"
+        return f"no: {policy} to {blind}, {robot}"
+
+    jitters = list(notes[0]["success"])
+    head = [f"of {notes[0]['episodes']}", *(f"{1000 * float(j):g} mm" for j in jitters)]
+    return markdown(head, [[note["task"], *(cell(note, j) for j in jitters)] for note in notes])
 
 
 def table(note: dict[str, Any]) -> str:

@@ -52,6 +52,10 @@ FEW_STEPS = (
     "curves of success say which method was on its way, and the rivals with three times the "
     "steps whether it gets there.\n"
 )
+EYES = (
+    "Successes of the policy, to those of the best robot without eyes. Where a task says no, a "
+    "success there does not show that the policy looks.\n"
+)
 PAGE_CSS = (
     CSS
     + """
@@ -251,7 +255,8 @@ def needs_eyes(plan: Plan, change: str) -> str:
     found = {note["task"]: note["success"] for note in notes}
     figure = figures.over_jitter(found, notes[0]["episodes"])
     tables = "\n".join(controls.table(note) for note in notes)
-    return shown(plan, name, figure, "Success of the controls over start jitter") + "\n" + tables
+    text = shown(plan, name, figure, "Success of the controls over start jitter")
+    return f"{text}\n{EYES}\n{controls.eyes_pay(notes)}\n{tables}"
 
 
 def trained_wide(runs: dict[tuple[str, str], list]) -> str:
