@@ -94,6 +94,16 @@ def test_eyes_pay_where_intervals_do_not_meet():
     assert said(0, 90)[2] == "| push | no: 0 to 90, idle |"
 
 
+def test_tasks_stand_side_by_side_at_one_jitter():
+    notes = [
+        {"task": task, "episodes": n, "success": {"0.01": {"idle": 0}, "0.02": {"idle": wins}}}
+        for task, n, wins in (("reach", 10, 5), ("push", 100, 0))
+    ]
+    head, _, row = controls.side_by_side(notes, 0.02).splitlines()
+    assert head == "| 20 mm | reach | push |"
+    assert row == "| idle | 5/10 (24-76 %) | 0/100 (0-4 %) |"
+
+
 def test_robots_without_eyes_do_what_their_names_say():
     down = controls.down_then_along(2)
     assert [down(None, t).tolist() for t in (0, 1, 2, 9)] == [[0, 0, -1]] * 2 + [[1, 0, 0]] * 2
@@ -139,7 +149,7 @@ def test_a_rival_is_tested_beside_it_on_the_same_starts(tmp_path, monkeypatch):
 def test_the_shipped_policy_reaches_and_idle_does_not(tmp_path, capsys, monkeypatch):
     whole = controls.measure
     monkeypatch.setattr(controls, "measure", lambda *asked: whole(*asked, brief=True))
-    controls.main(["reach", "--episodes", "1", "--out", str(tmp_path)])
+    controls.main(["reach", "--episodes", "1", "--jitter", str(JITTER), "--out", str(tmp_path)])
     found = json.loads((tmp_path / "reach.json").read_text())["success"][str(JITTER)]
     assert found["the policy"] == 1 and found["idle"] == 0
     assert len(found) == 9

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,7 @@ from lbw_minimal import rivals, sac
 from lbw_minimal.imitate import watched
 from lbw_minimal.report import wilson
 from lbw_minimal.training import InputError, counted, write_atomic
-from tasks.commands import JITTER, Parser, at_least, make_folder
+from tasks.commands import JITTER, Parser, at_least, make_folder, metres
 from tasks.commands.run import TEST_SEED
 from tasks.commands.table import METHODS, markdown
 
@@ -205,6 +205,7 @@ def parser() -> Parser:
     p.add_task()
     p.add_weights()
     p.add_argument("--episodes", type=at_least(1), default=100, help="test episodes for each")
+    p.add_argument("--jitter", type=metres, metavar="M", help="test at this start jitter alone (m)")
     p.add_argument("--seed", type=at_least(0), default=0, help="that the weights were trained with")
     p.add_argument(
         "--beside", type=Path, action="append", default=[], metavar="DIR", help="a rival's run"
@@ -221,7 +222,8 @@ def main(argv: list[str]) -> None:
     weights = args.weights or tasks.WEIGHTS / args.task
     make_folder(args.out)
     beside = {method_of(run): run for run in args.beside}
-    note = measure(args.task, weights, args.episodes, args.seed, beside)
+    jitters = JITTERS if args.jitter is None else (args.jitter,)
+    note = measure(args.task, weights, args.episodes, args.seed, beside, jitters)
     write_atomic(args.out / f"{args.task}.json", json.dumps(note, indent=1) + "\n")
     print(table(note), end="")
 
@@ -241,17 +243,18 @@ def measure(
     episodes: int,
     seed: int,
     beside: Mapping[str, Path],
+    jitters: Sequence[float] = JITTERS,
     brief: bool = False,
 ) -> dict[str, Any]:
-    """`compare` at every jitter of `JITTERS`, with what was asked beside it.
+    """`compare` at every jitter (m), with what was asked beside it.
 
-    brief: at the first jitter alone, with hardly any trials, for a smoke run.
+    brief: with hardly any trials, for a smoke run.
     """
     torch.set_num_threads(1)  # for single frames a second thread costs more than it brings
     few = {"library": 2, "trials": 1} if brief else {}
     found = {
         str(jitter): compare(task, weights, jitter, episodes, seed, beside, **few)
-        for jitter in (JITTERS[:1] if brief else JITTERS)
+        for jitter in jitters
     }
     return {"task": task, "episodes": episodes, "seed": seed, "success": found}
 
@@ -279,11 +282,23 @@ def eyes_pay(notes: list[dict[str, Any]]) -> str:
 def table(note: dict[str, Any]) -> str:
     """What `main` wrote, as Markdown: a row a robot, a column a jitter, with 95 % intervals."""
     success, n = note["success"], note["episodes"]
-
-    def cell(jitter, robot):
-        low, high = wilson(success[jitter][robot], n)
-        return f"{success[jitter][robot]}/{n} ({100 * low:.0f}-{100 * high:.0f} %)"
-
     head = [note["task"], *(f"{1000 * float(jitter):g} mm" for jitter in success)]
     robots = next(iter(success.values()))
-    return markdown(head, [[robot, *(cell(j, robot) for j in success)] for robot in robots])
+    rows = [[robot, *(share(row[robot], n) for row in success.values())] for robot in robots]
+    return markdown(head, rows)
+
+
+def side_by_side(notes: list[dict[str, Any]], jitter: float) -> str:
+    """What `measure` returned of several tasks, at one of its jitters (m): a column a task."""
+    found = [note["success"][str(jitter)] for note in notes]
+    rows = [
+        [robot, *(share(f[robot], n["episodes"]) for f, n in zip(found, notes, strict=True))]
+        for robot in found[0]
+    ]
+    return markdown([f"{1000 * jitter:g} mm", *(note["task"] for note in notes)], rows)
+
+
+def share(wins: int, episodes: int) -> str:
+    """Successes of so many, with the 95 % interval."""
+    low, high = wilson(wins, episodes)
+    return f"{wins}/{episodes} ({100 * low:.0f}-{100 * high:.0f} %)"

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -52,6 +53,7 @@ FEW_STEPS = (
     "curves of success say which method was on its way, and the rivals with three times the "
     "steps whether it gets there.\n"
 )
+WIDE = 0.02  # m, the start jitter of `batch`'s "wide" runs
 EYES = (
     "Successes of the policy, to those of the best robot without eyes. Where a task says no, a "
     "success there does not show that the policy looks.\n"
@@ -149,14 +151,18 @@ def write(plan: Plan) -> Path:
         ),
         ("Table II, run by run", "table --rivals", every_run(runs)),
         ("Success over environment steps", "table --rivals", over_steps(plan)),
-        ("Does it need to see?", "controls TASK", needs_eyes(plan, "")),
+        ("Does it need to see?", "controls TASK", needs_eyes(plan)),
         ("Figure 5: translations of push", "push --method avid", translated(plan)),
         ("What keypoints know after each translation", "probe push", perception(plan)),
     ]
     if not plan.fast:
         items += [
             ("Trained with starts moved by 2 cm", "TASK --jitter 0.02", trained_wide(runs)),
-            ("Does that need to see?", "controls TASK --weights DIR", needs_eyes(plan, "wide")),
+            (
+                "Does that need to see?",
+                f"controls TASK --weights DIR --jitter {WIDE}",
+                needs_eyes_wide(plan),
+            ),
             ("The rivals with three times the steps", "paper", long_runs(runs)),
             ("Success over human videos, push", "push --videos N", over_videos(runs)),
         ]
@@ -234,29 +240,38 @@ def over_steps(plan: Plan) -> str:
     return shown(plan, "steps", figures.over_steps(logs), "Success over environment steps")
 
 
-def needs_eyes(plan: Plan, change: str) -> str:
+def measured(plan: Plan, change: str, jitters: Sequence[float]) -> list[dict]:
     """The controls of all tasks, of LbW's first seed, and beside the recipe the rivals'."""
-    name = change or "controls"
 
     def note_of(task):
-        path = plan.out / name / f"{task}.json"
+        path = plan.out / (change or "controls") / f"{task}.json"
         if not path.exists():
             make_folder(path.parent)
-            beside = (
+            rivals = (
                 {} if change else {METHODS[c][0]: folder(plan.runs, task, 0, c) for c in RIVALS}
             )
-            note = controls.measure(
-                task, folder(plan.runs, task, 0, change), plan.controls, 0, beside, plan.fast
-            )
+            run = folder(plan.runs, task, 0, change)
+            note = controls.measure(task, run, plan.controls, 0, rivals, jitters, plan.fast)
             write_atomic(path, json.dumps(note, indent=1) + "\n")
         return json.loads(path.read_text(encoding="utf-8"))
 
-    notes = [note_of(task) for task in tasks.TASKS]
+    return [note_of(task) for task in tasks.TASKS]
+
+
+def needs_eyes(plan: Plan) -> str:
+    """The controls over start jitter, and where they leave something to see."""
+    notes = measured(plan, "", controls.JITTERS[: 1 if plan.fast else None])
     found = {note["task"]: note["success"] for note in notes}
     figure = figures.over_jitter(found, notes[0]["episodes"])
+    text = shown(plan, "controls", figure, "Success of the controls over start jitter")
     tables = "\n".join(controls.table(note) for note in notes)
-    text = shown(plan, name, figure, "Success of the controls over start jitter")
     return f"{text}\n{EYES}\n{controls.eyes_pay(notes)}\n{tables}"
+
+
+def needs_eyes_wide(plan: Plan) -> str:
+    """The controls of what was trained with starts moved by 2 cm, on such starts."""
+    notes = measured(plan, "wide", (WIDE,))
+    return f"{controls.side_by_side(notes, WIDE)}\n{controls.eyes_pay(notes)}"
 
 
 def trained_wide(runs: dict[tuple[str, str], list]) -> str:
