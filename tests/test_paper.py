@@ -133,6 +133,6 @@ def test_the_order_of_methods_is_held_against_the_papers():
     assert "- reach: Classifier reward is above AVID-m, in the paper equal" in lines
     assert "- reach: AVID-m is below LbW, in the paper equal" in lines
     assert not [line for line in lines if "push" in line or "slide" in line]
-    assert "- coffee: AVID-m is not told from LbW, in the paper below it" in lines
+    assert "- coffee: AVID-m is not to be told from LbW, in the paper below it" in lines
     assert "- drawer: Classifier reward is below AVID-m, in the paper above it" in lines
     assert sum(line.startswith("-") for line in lines) == 2 + 3 + 2

@@ -11,7 +11,7 @@ import itertools
 import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import gymnasium as gym
 import numpy as np
@@ -26,6 +26,7 @@ from lbw_minimal.training import InputError, counted, write_atomic
 from tasks.commands import JITTER, Parser, at_least, make_folder, metres
 from tasks.commands.run import TEST_SEED
 from tasks.commands.table import METHODS, markdown
+from tasks.world import SIZE, TaskEnv
 
 JITTERS = (JITTER, 0.01, 0.02, 0.04)  # m
 TRIAL_SEED, TRIALS = 2_000_000, 10  # starts on which blind robots are chosen
@@ -41,25 +42,31 @@ BLIND = (  # what has no eyes at all
 Robot = Callable[[np.ndarray, int], np.ndarray]  # (observation, step of the episode) -> action
 
 
-class Frozen(gym.ObservationWrapper):
-    """A camera that shows an episode's first frame for ever."""
+class Frozen(gym.Wrapper):
+    """A task whose camera shows an episode's first frame for ever."""
 
     def reset(self, **options: Any) -> tuple[np.ndarray, dict]:
         """As Gymnasium's; the camera takes its one picture."""
-        self.first, info = self.env.reset(**options)
-        return self.first, info
+        camera_of(self).pop("render", None)
+        first, info = self.env.reset(**options)
+        camera_of(self)["render"] = (
+            first.copy
+        )  # a picture that nobody sees is three quarters of a step
+        return first, info
 
-    def observation(self, observation: np.ndarray) -> np.ndarray:
-        """The first frame (84, 84, 3) uint8, whatever there is to see."""
-        return self.first
+
+class Grey(gym.Wrapper):
+    """A task whose camera shows nothing: grey frames (84, 84, 3) uint8."""
+
+    def __init__(self, env: gym.Env):
+        super().__init__(env)
+        nothing = np.full((SIZE, SIZE, 3), 128, np.uint8)
+        camera_of(self)["render"] = nothing.copy
 
 
-class Grey(gym.ObservationWrapper):
-    """A camera that shows nothing."""
-
-    def observation(self, observation: np.ndarray) -> np.ndarray:
-        """A grey frame (84, 84, 3) uint8."""
-        return np.full_like(observation, 128)
+def camera_of(env: gym.Env) -> dict[str, Any]:
+    """What stands in for the methods of a task's world: its `render` takes the pictures."""
+    return cast(TaskEnv, env.unwrapped).world.__dict__
 
 
 def replay(actions: np.ndarray) -> Robot:
@@ -169,16 +176,16 @@ def compare(
     found = {"the policy": wins(env, trained, episodes)}
     for name, run in beside.items():
         found[name] = rival_wins(task, run, jitter, episodes)
-    for name, camera in (("its camera frozen", Frozen), ("its camera grey", Grey)):
-        blinded = seen_through(camera)[0]
-        found[name] = wins(blinded, trained, episodes)
-        blinded.close()
+    frozen, grey = (seen_through(camera)[0] for camera in (Frozen, Grey))
+    found["its camera frozen"] = wins(frozen, trained, episodes)
+    found["its camera grey"] = wins(grey, trained, episodes)
     seeds = counted(range(TRIAL_SEED, TRIAL_SEED + library), library, "the policy's episodes")
     own = [play(env, trained, seed) for seed in seeds]
     done = [episode for episode in own if episode[0]] or own
     looks = look_once(np.stack([first for _, _, first, _ in done]), [a for *_, a in done])
-    found["looks once, then replays"] = wins(env, looks, episodes)
-    env.close()
+    found["looks once, then replays"] = wins(frozen, looks, episodes)
+    for seen in (env, frozen, grey):
+        seen.close()
 
     blind: gym.Env = gym.make(tasks.id_of(task), jitter=jitter, observation="state")
     blind = TimeLimit(blind, reward.episode)  # whose true state no blind robot reads

@@ -63,8 +63,11 @@ PAGE_CSS = (
     + """
 body { max-width: 72rem }
 p:has(img) { max-width: none; overflow-x: auto }
-td, th { white-space: nowrap }
-@media screen and (max-width: 40rem) { p > img { max-width: none; width: 44rem } }
+@media screen and (max-width: 40rem) {
+  p > img { max-width: none; width: 44rem }
+  td, th { white-space: nowrap }
+}
+@media print { table { font-size: .72rem } th, td { padding-right: .6rem } }
 """
 )
 
@@ -172,7 +175,7 @@ def write(plan: Plan) -> Path:
     for title, command, body in items:
         text += f"\n## {title}\n\n{body}\n`python -m tasks {command}`\n"
     write_atomic(plan.out / "paper.md", text)
-    body = str(mistune.html(text))
+    body = str(mistune.html(text)).replace(" %", "\u00a0%")  # no line begins with it
     for path in sorted((plan.out / "figures").glob("*.svg")):  # the page needs no other file
         body = body.replace(f"figures/{path.name}", data_uri("image/svg+xml", path.read_bytes()))
     page = HTML.format(title="Learning by Watching, made again", css=PAGE_CSS, body=body)

@@ -177,7 +177,7 @@ def table_two(runs: dict[tuple[str, str], list[Row]]) -> str:
 def order(runs: dict[tuple[str, str], list[Row]]) -> str:
     """Where the methods' order is not Table II's, as a list; ours counts where intervals part."""
     lines = []
-    ours_is = {1: "above", 0: "not told from", -1: "below"}
+    ours_is = {1: "above", 0: "not to be told from", -1: "below"}
     theirs_is = {1: "above it", 0: "equal", -1: "below it"}
     for task, (a, b) in itertools.product(tasks.TASKS, itertools.combinations(METHODS, 2)):
         (_, low_a, high_a), (_, low_b, high_b) = (rate(runs[task, change]) for change in (a, b))
