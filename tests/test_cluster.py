@@ -20,6 +20,7 @@ from tasks.commands import batch, cluster, table
 from tests.grade import sandbox
 from tests.grade.__main__ import main as grade
 from tests.grade.cluster import grade_here
+from tests.grade.files import File
 
 ROOT = Path(__file__).resolve().parents[1]
 SOLVED = json.loads((ROOT / "solutions" / "06_reward.ipynb").read_text())
@@ -260,6 +261,21 @@ def test_a_node_without_a_sandbox_does_not_grade(monkeypatch):
     monkeypatch.setattr(sandbox, "failing", lambda: "its sandbox does not start")
     with pytest.raises(cluster.Refused, match="its sandbox does not start"):
         grade_here([], [], "", ["6.1"], 2, False)
+
+
+def test_a_node_keeps_its_sandbox_and_gets_a_new_one_after_a_failure(monkeypatch):
+    box = sandbox.Sandbox()
+    monkeypatch.setattr(tests.grade.cluster, "_box", lambda: box)
+    solved = [File("06_reward.ipynb", json.dumps(SOLVED).encode())]
+    with box:
+        _, (first,), _ = grade_here(solved, [], "", ["6.1"], 2, False)
+        worker = box.process
+        _, (again,), _ = grade_here(solved, [], "", ["6.1"], 2, False)
+        assert first == again and first.points == first.most
+        assert box.process is worker and worker.poll() is None
+        with pytest.raises(KeyError):
+            grade_here(solved, [], "", ["no such exercise"], 2, False)
+        assert worker.poll() is not None and box.process is None
 
 
 # Grading
