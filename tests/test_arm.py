@@ -1,11 +1,24 @@
 """The arms and their controller: claims about kinematics and about how the tip moves."""
 
+import xml.etree.ElementTree as ET
+
 import numpy as np
 import pytest
 
 from tasks.reach import Reach
+from tasks.world.bodies import panda
 
 EMBODIMENTS = ("robot", "human")
+
+
+def test_the_pandas_limits_are_those_of_its_file():
+    limits = [
+        joint.find("limit")
+        for joint in ET.fromstring(panda().urdf).iter("joint")
+        if joint.get("type") == "revolute"
+    ]
+    assert panda().effort == tuple(float(limit.get("effort")) for limit in limits)
+    assert panda().speed == tuple(float(limit.get("velocity")) for limit in limits)
 
 
 @pytest.fixture(params=EMBODIMENTS)

@@ -47,6 +47,44 @@ def test_a_hue_turns_and_grey_stays():
     assert torch.allclose(recoloured(red, 0), red, atol=1e-6)
 
 
+def test_a_turned_hue_is_as_bright_and_as_strong_and_turned_to_either_side():
+    """By the angle about the grey axis, up to 90 degrees here, each image by its own."""
+    torch.manual_seed(0)
+    y = torch.randn(400, 3, 1, 1)
+    turned = recoloured(y, 90)
+    assert torch.allclose(turned.sum(1), y.sum(1), atol=1e-5)
+    assert torch.allclose(turned.norm(dim=1), y.norm(dim=1), atol=1e-5)
+    before, after = (v[:, :, 0, 0] - v.mean(1)[:, 0] for v in (y, turned))
+    sine = torch.linalg.cross(before, after, dim=1).sum(1) / 3**0.5
+    angle = torch.rad2deg(torch.atan2(sine, (before * after).sum(1)))
+    angle = angle[angle.abs() > 0.1]
+    assert 160 < len(angle) < 240
+    assert -90.1 < angle.min() < -80 and 80 < angle.max() < 90.1
+    assert angle.std().item() == pytest.approx(90 / 3**0.5, rel=0.1)
+
+
+def test_a_poor_camera_is_as_poor_as_it_says():
+    """Per channel a gain of 1 +- 0.15 and an offset of 0.1; half of the images lose an edge."""
+    torch.manual_seed(0)
+    y = torch.zeros(1000, 3, 10, 10)
+    y[:, :, :, 5:] = 1.0
+    seen = degraded(y)[:, :, 1:-1]
+    dark, light = seen[..., 1:4].mean((2, 3)), seen[..., 6:9].mean((2, 3))  # beside the edge
+    gain = light - dark
+    assert gain.mean().item() == pytest.approx(1, abs=0.02)
+    assert gain.std().item() == pytest.approx(0.15, rel=0.1)
+    assert dark.mean().abs() < 0.01 and dark.std().item() == pytest.approx(0.1, rel=0.1)
+    for v in (gain, dark):
+        assert (torch.corrcoef(v.T) - torch.eye(3)).abs().max() < 0.12
+    step = (seen[..., 5] - seen[..., 4]).mean(2) / gain  # 1 where it is sharp, 1/3 where it is not
+    sharp = step.mean(1) > 2 / 3
+    assert 430 < sharp.sum() < 570
+    assert step[~sharp].mean().item() == pytest.approx(1 / 3, abs=0.05)
+    # Noise of up to 0.1, uniformly: its mean square is 0.1^2 / 3.
+    noise = seen[sharp][..., 1:4].var((2, 3)).mean().item()
+    assert noise == pytest.approx(0.01 / 3, rel=0.15)
+
+
 def test_a_poor_camera_moves_nothing(dots):
     y, z = dots
     assert torch.allclose(brightest(degraded(20 * y)), z, atol=1 / 42 + 1e-6)  # blur is 3 px wide

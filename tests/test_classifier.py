@@ -54,7 +54,29 @@ def test_half_of_a_batch_are_goals_and_they_are_labelled_1():
     goals, others = torch.ones(3, 3, 48, 48), torch.zeros(40, 3, 48, 48)
     images, labels = classifier._draw(goals, others, np.random.default_rng(0))
     assert torch.equal(images[:, 0, 0, 0], labels) and labels.mean() == 0.5
-    assert len(labels) == classifier.BATCH
+    assert len(labels) == 128
+
+
+def test_it_learns_at_vices_rate_from_any_mixture_alike(monkeypatch):
+    """Shares are uniform: of mean 1/2 and deviation 12^-1/2."""
+    rates, shares = [], []
+    update, mixup = classifier._update, classifier.mixup
+
+    def told(model, optimizer, *rest):
+        rates.append(optimizer.param_groups[0]["lr"])
+        return update(model, optimizer, *rest)
+
+    def mixed(images, labels, share, partner):
+        shares.append(share)
+        return mixup(images, labels, share, partner)
+
+    monkeypatch.setattr(classifier, "_update", told)
+    monkeypatch.setattr(classifier, "mixup", mixed)
+    classifier.train(grey(200), grey(20), iterations=8, seed=0)
+    assert rates == 8 * [1e-4]
+    shares = torch.cat(shares)
+    assert shares.mean().item() == pytest.approx(0.5, abs=0.04)
+    assert shares.std().item() == pytest.approx(12**-0.5, abs=0.02)
 
 
 def test_small_images_keep_colour_and_place():

@@ -18,7 +18,7 @@ def test_learning_rate_holds_for_half_the_training_and_then_falls_to_nothing():
 
 def test_averaged_weights_remember_little_at_first_and_two_hundred_steps_later():
     average, model = nn.Linear(1, 1), nn.Linear(1, 1)
-    for step, share in ((1, 10 / 11), (10, 1 / 2), (100_000, 1 - gan.AVERAGE)):
+    for step, share in ((1, 10 / 11), (10, 1 / 2), (100_000, 1 / 200)):
         nn.init.zeros_(average.weight)
         nn.init.ones_(model.weight)
         gan.follow(average, model, step)

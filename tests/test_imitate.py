@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from gymnasium.envs.registration import EnvSpec
+from toy_push import ToyPush
 
 from lbw_minimal.imitate import (
     Perception,
@@ -10,6 +12,7 @@ from lbw_minimal.imitate import (
     learn_perception,
     load_perception,
     make_reward,
+    watched,
 )
 from lbw_minimal.training import InputError
 
@@ -60,3 +63,19 @@ def test_a_form_of_reward_that_does_not_exist_is_refused(watcher):
 def test_one_mend_is_left_out_and_the_others_stay(watcher):
     late, early = (make_reward(watcher, frames(6), without=m) for m in ("timed", "include_goal"))
     assert not late.timed and early.timed and late.last == early.last + 1
+
+
+@pytest.mark.parametrize("horizon", [20, 1000, None])
+def test_an_episode_ends_where_the_task_or_the_demonstration_does(watcher, horizon):
+    env = ToyPush()
+    env.spec = horizon and EnvSpec("Toy-v0", max_episode_steps=horizon)
+    env.horizon = 10**6
+    env, reward = watched(env, watcher, frames(6))
+    env.reset(seed=0)
+    steps, over = 0, False
+    while not over:
+        *_, over, _ = env.step(np.zeros(3, np.float32))
+        steps += 1
+    assert steps == (20 if horizon == 20 else reward.episode)
+    # 80 % of the 20 steps are the demonstration's; without such haste it takes longer.
+    assert (len(reward.z_E) == 16) == (horizon == 20)

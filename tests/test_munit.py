@@ -95,24 +95,24 @@ def test_critics_step_sends_no_gradient_to_the_generator():
 
 def test_motion_weighs_image_and_cycle_losses_pixel_by_pixel():
     x, y = image(1), image(2)
-    # the weights' mean is 1 + MOTION_L1 / 4
+    # the weights' mean is 1 + 4 / 4
     median = torch.tensor([1.0, 1.0, 1.0, 0.0]).view(1, 1, 2, 2)
     plain = generator_losses(Stub(), CRITICS, x, y, swap(Stub(), x, y))
     heavy = generator_losses(Stub(), CRITICS, x, y, swap(Stub(), x, y), median_x=median)
-    assert heavy["L_rec^x"] == (1 + munit.MOTION_L1 / 4) * plain["L_rec^x"]
-    assert heavy["L_cyc^x"] == (1 + munit.MOTION_L1 / 4) * plain["L_cyc^x"]
+    assert heavy["L_rec^x"] == (1 + 4 / 4) * plain["L_rec^x"]
+    assert heavy["L_cyc^x"] == (1 + 4 / 4) * plain["L_cyc^x"]
     assert heavy["L_rec^y"] == plain["L_rec^y"]
 
 
 def test_motion_makes_critics_judge_the_arm_not_the_wall():
     median, made = image(0), image(0)
-    made[..., 1, 1] = 1.0  # moved there: weight 1 + MOTION_GAN, elsewhere 1
+    made[..., 1, 1] = 1.0  # moved there: weight 1 + 20, elsewhere 1
     # errors against 0 for translated: 1 there, 0 elsewhere
     critics = {d: lambda v: [v] for d in "xy"}
     L = discriminator_losses(
         critics, image(1), image(1), (None,) * 4 + (made, made), median_x=median
     )
-    share = (1 + munit.MOTION_GAN) / (4 + munit.MOTION_GAN)
+    share = (1 + 20) / (4 + 20)
     assert L["L_D^x"].item() == pytest.approx(share) and L["L_D^y"].item() == pytest.approx(1 / 4)
 
 
@@ -354,3 +354,8 @@ def test_a_critics_scores_look_at_patches_of_22_and_44_pixels():
         (seen,) = torch.autograd.grad(score[0, 0, h, h], v)
         rows = seen.abs().sum((0, 1, 3)).nonzero()
         assert rows.max() - rows.min() + 1 == size
+
+
+def test_the_critics_leak_a_fifth_as_published():
+    slopes = [m.negative_slope for m in munit.Critic().modules() if isinstance(m, nn.LeakyReLU)]
+    assert slopes == 6 * [0.2]

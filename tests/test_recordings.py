@@ -57,6 +57,23 @@ def test_the_shipped_random_motion_played_again_shows_the_shipped_film(name):
     env.close()
 
 
+@pytest.mark.parametrize("name", tasks.TASKS)
+def test_the_shipped_motion_is_thought_out_again_from_its_seeds(name):
+    """The expert's actions, where random takes start, and what chance does in them."""
+    env = tasks.bare(name, embodiment="human", observation="state")
+    experts, takes = shipped(name), load_recordings(tasks.VIDEOS / name / "random.npz")
+    _, _, again = record_expert(env, experts[0].seed)
+    np.testing.assert_allclose(again.actions, experts[0].actions, atol=1e-3)
+    for kept in takes[:8]:
+        start, _ = env.reset(seed=kept.seed, options={"scatter": True})
+        np.testing.assert_allclose(start, kept.states[0], atol=1e-6)
+    drawn = random_takes(env, 40, seed=experts[-1].seed + 1, take=20)
+    for (_, _, again), kept in zip(drawn, takes[:2], strict=True):
+        assert again.seed == kept.seed
+        np.testing.assert_allclose(again.actions, kept.actions, atol=1e-6)
+    env.close()
+
+
 def differ(frames, shown):
     """Share of the values that are off by more than 20 grey levels. A video file costs 1e-5 of
     reach's; another expert's film of the ball has 3e-3, a film one frame late 1e-2."""

@@ -1,16 +1,18 @@
 """A clip's motion, done by the simulated human: every task is done, at other paces, too."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from toy_pushes import seen
+from toy_pushes import HIT, SCENE, seen
 
 from lbw_minimal.clips.paths import Unusable, interpolate
-from lbw_minimal.clips.retarget import lay
+from lbw_minimal.clips.retarget import Motion, lay
 from tasks import TASKS, bare
-from tasks.world import record_expert
-from tasks.world.reenact import reenact
+from tasks.world import Recording, record_expert
+from tasks.world import reenact as module
+from tasks.world.reenact import commands, reenact
 
 SCALE = 5  # times the kit's frames of 84 pixels: the size of the clip
 
@@ -55,3 +57,116 @@ def test_a_motion_that_does_not_do_the_task_is_refused():
     high = replace(motion, tip=np.stack([motion.tip[:, 0], np.full(len(motion.tip), 0.15)], 1))
     with pytest.raises(Unusable, match="ends 15 cm from the goal"):
         reenact(env, high)
+
+
+def along(*x, contact=1, arrival=3):
+    """A motion of the tip along x at 2 cm, with an object."""
+    tip = np.stack([np.array(x, float), np.full(len(x), 0.02)], 1)
+    return Motion(tip, tip, np.arange(len(x)) / 25, contact, arrival, np.eye(2, 3), False)
+
+
+class Table:
+    """An environment of which only the tip's goal is there."""
+
+    STEP = 2.0
+
+    def __init__(self, scene):
+        self.scene, self.arm = lambda: scene, SimpleNamespace(goal=np.array([0.0, 0, 0.02]))
+
+    def reset(self, seed):
+        assert seed == 0
+
+
+def ended(at, start=0.0, goal=1.0, done=True):
+    """What is recorded when the object goes from `start` to `at`."""
+    states = np.zeros((2, 9))
+    states[:, 3], states[:, 6] = (start, at), goal
+    return Recording(0, False, None, states, None, np.array([False, done]))
+
+
+def test_the_goal_follows_the_motion_and_runs_ahead_of_it_from_contact_to_arrival():
+    env, goals = Table(SCENE), []
+    for action in commands(env, along(0, 1, 2, 3, 3), further=0.4):
+        env.arm.goal = env.arm.goal + env.STEP * action
+        goals.append(env.arm.goal.tolist())
+    wanted = [[x, 0, 0.02] for x in (1, 2.2, 3.4, 3.4)]
+    assert np.array(goals) == pytest.approx(np.array(wanted), abs=1e-6)
+    (far,), (back,) = (commands(Table(SCENE), along(0, x)) for x in (9, -9))
+    assert far.tolist() == [1, 0, 0] and back.tolist() == [-1, 0, 0]
+
+
+def test_after_a_hit_the_hand_rests_for_as_long_as_a_puck_slides():
+    actions = list(commands(Table(HIT), along(0, 0, 0)))
+    assert len(actions) == 2 + 40 and not np.any(actions)
+
+
+def test_a_hit_alone_becomes_faster_from_the_run_up_to_the_stop():
+    motion = along(0, 0, 0, 1, 2, 2, 2, contact=3, arrival=4)
+    fast, slow = (module._faster(motion, factor).tip[:, 0] for factor in (2.0, 0.5))
+    assert fast.tolist() == pytest.approx([0, 0, 0, 2, 2, 2])
+    assert slow.tolist() == pytest.approx([0, 0, 0, 0.5, 1, 1.5, 2, 2, 2])
+    at_once = module._faster(along(0, 1, 2, 2), 0.5).tip[:, 0]
+    assert at_once.tolist() == pytest.approx([0, 0.5, 1, 1.5, 2, 2])
+
+
+def rehearsing(monkeypatch, end):
+    """Rehearsals end as `end` says of how much farther, or faster, the motion is; they are told."""
+    asked = []
+
+    def rehearse(env, motion, further=0.0):
+        value = motion if isinstance(motion, float) else further
+        asked.append(value)
+        return end(value)
+
+    monkeypatch.setattr(module, "_rehearse", rehearse)
+    monkeypatch.setattr(module, "_faster", lambda motion, factor: factor)
+    return asked
+
+
+def test_a_push_goes_on_by_what_was_missing_until_it_is_within_a_centimetre(monkeypatch):
+    """The object follows by half: 3, 1.5, 0.75 cm are missing. Then one that hardly follows."""
+    asked = rehearsing(monkeypatch, lambda further: ended(0.97 + further / 2))
+    assert module._measured_push(None, None) == (pytest.approx(0.045), True)
+    assert asked == pytest.approx([0, 0.03, 0.045])
+    asked = rehearsing(monkeypatch, lambda further: ended(0.9 + 0.05 * further))
+    further, _ = module._measured_push(None, None)
+    assert asked == pytest.approx([0, 0.1]) and further == asked[1]
+    asked = rehearsing(monkeypatch, lambda further: ended(0.9 + 0.12 * further))
+    module._measured_push(None, None)
+    assert len(asked) == 6
+
+
+def test_of_all_pushes_one_that_does_the_task_is_taken(monkeypatch):
+    rehearsing(monkeypatch, lambda further: ended(0.95 + 0.2 * further, done=further < 0.06))
+    assert module._measured_push(None, None)[1]
+    rehearsing(monkeypatch, lambda further: ended(0.97, done=False))
+    assert not module._measured_push(None, None)[1]
+
+
+@pytest.mark.parametrize(
+    ("reached", "factor", "word"),
+    [
+        (2.0, 2.0, "weak"), (0.5, 0.5, "strong"), (1.4, 1.4, ""), (0.7, 0.7, ""),
+        (9.0, 4.0, "weak"), (0.1, 0.25, "strong"),
+    ],
+)  # fmt: skip
+def test_a_hit_is_as_fast_as_the_square_of_its_speed_asks(monkeypatch, reached, factor, word):
+    """From 0.5 m to the goal at 1 m, which the hit reaches at `reached` times its speed."""
+    asked = rehearsing(monkeypatch, lambda f: ended(0.5 + 0.5 * (f / reached) ** 2, start=0.5))
+    notes, warnings = [], []
+    assert module._timed_hit(None, None, notes, warnings) == pytest.approx(factor)
+    (text,) = notes + warnings
+    assert f"at {factor:.2f} times" in text and bool(warnings) == bool(word) and word in text
+    assert len(asked) == (2 if factor == reached else 6)
+
+
+def test_a_push_that_fails_is_done_again_at_two_thirds_of_the_pace(monkeypatch):
+    motion, results = along(0, 1, 2, 2), iter([(0.0, False), (0.02, True)])
+    monkeypatch.setattr(module, "_measured_push", lambda env, motion: next(results))
+    monkeypatch.setattr(module, "film", lambda env, seed, actions: (None, None, ended(1.0)))
+    done = reenact(Table(SCENE), motion)
+    assert done.motion.tip[:, 0].tolist() == pytest.approx([0, 2 / 3, 4 / 3, 2, 2, 2])
+    assert "1.5 times slower" in done.warnings[0] and "+2.0 cm" in done.notes[0]
+    monkeypatch.setattr(module, "_measured_push", lambda env, motion: (0.009, True))
+    done = reenact(Table(SCENE), motion)
+    assert done.motion is motion and not done.notes + done.warnings

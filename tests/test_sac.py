@@ -108,6 +108,15 @@ def test_the_target_holds_the_entropy_term():
     assert torch.allclose(targets[0] - targets[1], sac.gamma * 0.5 * log_pi, atol=1e-5)
 
 
+def test_the_target_by_hand_with_the_recipes_discount_and_temperature():
+    """r + gamma (the lesser Q' - alpha log pi)."""
+    sac = SAC(1, 1, width=8)
+    sac.actor.sample = lambda s: (torch.zeros(8, 1), torch.full((8,), 3.0))
+    sac.target.forward = lambda s, a: torch.tensor([[2.0], [2.5]]).expand(2, 8)
+    y = sac.critic_target(batch_of(obs_dim=1, action_dim=1, reward=torch.ones(8)))
+    assert y.tolist() == pytest.approx(8 * [1 + 0.95 * (2 - 0.02 * 3)])
+
+
 def test_the_target_takes_the_lesser_of_the_two_critics():
     sac = small()
     sac.target.biases[2].data[:, 0, 0] = torch.tensor([1000.0, -1000.0])
@@ -438,6 +447,33 @@ def test_the_actor_that_earns_most_without_noise_is_chosen():
 
     for order in (actors, actors[::-1]):
         assert best_actor(env, sac, order, seed=0) is max(actors, key=earned)
+
+
+def test_all_candidates_act_in_the_same_five_episodes():
+    env, sac, starts = Walk(), SAC(1, 1, width=8), []
+    reset = env.reset
+    env.reset = lambda seed: starts.append(seed) or reset(seed=seed)
+    best_actor(env, sac, 2 * [deepcopy(sac.test_actor.state_dict())], seed=0)
+    assert starts[:5] == starts[5:] and len(set(starts)) == 5
+
+
+def test_the_three_windows_of_ten_episodes_that_returned_most_are_kept():
+    sac, kept = small(), []
+    for mean in (1.0, 4.0, 2.0, 3.0):
+        log = [{"return": 99.0}, *5 * [{"return": mean - 1}], *5 * [{"return": mean + 1}]]
+        kept = module._best(kept, log, sac)
+    assert [candidate["return"] for candidate in kept] == [4, 3, 2]
+
+
+def test_a_training_takes_what_the_papers_table_was_made_with_unless_it_is_told(monkeypatch):
+    """Two updates of 128 transitions a step after 500 random ones, networks 128 wide."""
+    asked = {}
+    monkeypatch.setattr(module, "learn", lambda *_, **more: asked.update(more) or [])
+    sac, _ = train(Walk(), steps=7, seed=0)
+    assert (asked["updates"], asked["batch"], asked["random_steps"]) == (2, 128, 500)
+    assert (sac.rates, sac.tau, sac.average) == ((1e-3, 1e-3), 0.01, 0.005)
+    assert [len(p) for p in sac.actor.net.parameters()] == [128, 128, 128, 128, 2, 2]
+    assert [tuple(w.shape) for w in sac.critic.weights] == [(2, 2, 128), (2, 128, 128), (2, 128, 1)]
 
 
 def test_averaged_actors_of_the_best_windows_and_of_the_end_compete(monkeypatch):

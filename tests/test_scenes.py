@@ -1,13 +1,22 @@
-"""All scenes, both arms: the browser's mirror stands as in PyBullet, and the picture is whole."""
+"""All scenes, both arms: the browser's mirror stands as in PyBullet, and the picture is whole.
+
+`PYTHONPATH=. python tests/test_scenes.py` draws the robots' portraits anew, after a change that is
+meant; the shipped weights then have to be trained anew, too.
+"""
+
+from itertools import islice
+from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 from test_viewer import commands
 
 import tasks
 from tasks.world import World, expert_actions, random_actions
 from tasks.world.viewer import mirror, transform
 
+PORTRAITS = Path(__file__).parent / "robots.png"
 SCENES = [(name, arm) for name in tasks.TASKS for arm in ("robot", "human")]
 
 
@@ -80,3 +89,26 @@ def test_painting_the_scenery_once_changes_no_pixel(name, arm, monkeypatch):
     assert (difference > 2).mean() < 1e-3
     fast.close()
     full.close()
+
+
+def portrait(name):
+    """The robot (84, 84, 3) after half a second of its expert."""
+    env = make(name, "robot")
+    env.reset(seed=0)
+    for action in islice(expert_actions(env), 12):
+        env.step(action)
+    frame = env.world.render()
+    env.close()
+    return frame
+
+
+@pytest.mark.parametrize("name", tasks.TASKS)
+def test_the_robot_and_its_scene_look_as_they_did_to_the_shipped_weights(name):
+    """The films of the human do this for its arm and scene, see test_recordings."""
+    column = 84 * tasks.TASKS.index(name)
+    known = np.asarray(Image.open(PORTRAITS))[:, column : column + 84].astype(int)
+    assert (np.abs(portrait(name) - known) > 3).mean() < 1e-3
+
+
+if __name__ == "__main__":
+    Image.fromarray(np.concatenate([portrait(name) for name in tasks.TASKS], 1)).save(PORTRAITS)
