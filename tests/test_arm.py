@@ -126,3 +126,15 @@ def test_a_twisted_arm_comes_back_to_its_posture_while_its_tip_stays(env):
         env.step(np.zeros(3))
     after, moved = np.abs(free @ (arm.state()[0] - q)), arm.tip_pose()[0] - tip
     assert after < 0.4 * before and np.abs(moved).max() < 0.004
+
+
+def test_a_tip_gives_way_three_millimetres_out_of_its_box_and_no_sooner(env):
+    """As if a contact had pressed it out, while its goal stays inside."""
+    arm = env.arm
+    middle, (_, high) = arm.goal.copy(), arm.box
+    for out, goal in ((0.0025, middle), (0.0035, high)):
+        arm.goal = middle
+        arm.prepare()
+        arm._x = high + (0, 0, out)
+        arm.actuate()
+        np.testing.assert_allclose(arm.goal, goal, atol=1e-9)

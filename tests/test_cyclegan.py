@@ -238,6 +238,30 @@ def test_training_killed_and_resumed_ends_as_if_never_killed(tmp_path, monkeypat
     assert whole_log == resumed_log and [row["step"] for row in resumed_log] == [2, 4, 6]
 
 
+def test_training_takes_x_from_the_human_and_returns_the_averaged_weights(monkeypatch):
+    """At the published rates, which fall over the second half."""
+    human, robot = (np.full((4, 84, 84, 3), level, np.uint8) for level in (0, 255))
+    seen, rates = [], []
+
+    def update(model, critics, pools, adam_G, adam_D, x, y, medians):
+        rates.append([adam.param_groups[0]["lr"] for adam in (adam_G, adam_D)])
+        seen.append([v.mean().item() for v in (x, y, *medians)])
+        for adam, network in ((adam_G, model), (adam_D, critics)):
+            assert adam.param_groups[0]["params"][0] is next(network.parameters())
+        return {}
+
+    def follow(average, model, step):
+        for p in average.parameters():
+            p.data.fill_(step)
+
+    monkeypatch.setattr(cyclegan, "_update", update)
+    monkeypatch.setattr(gan, "follow", follow)
+    average, _ = cyclegan.train(human, robot, iterations=4, seed=0, width=2, motion=True)
+    assert seen == 4 * [[-1, 1, -1, 1]]
+    assert rates == [pytest.approx(v) for v in (*3 * [[2e-4, 2e-4]], [1e-4, 1e-4])]
+    assert all((p == 4).all() for p in average.parameters()) and not average.training
+
+
 def test_another_seed_gives_another_model():
     a, b = (
         cyclegan.train(*squares(), iterations=1, seed=seed, width=2, batch=1)[0] for seed in (0, 1)

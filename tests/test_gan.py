@@ -16,6 +16,23 @@ def test_learning_rate_holds_for_half_the_training_and_then_falls_to_nothing():
     assert rates == [8, 8, 4, 0]
 
 
+def test_adams_memory_is_the_publications():
+    assert gan.adam(nn.Linear(1, 1), 1.0).param_groups[0]["betas"] == (0.5, 0.999)
+
+
+@pytest.mark.parametrize("translation", [munit, cyclegan])
+def test_a_step_takes_four_images_of_each_domain(translation, monkeypatch):
+    shapes, frames = [], np.zeros((2, 84, 84, 3), np.uint8)
+
+    def update(*args):
+        shapes.extend(v.shape for v in args if torch.is_tensor(v))
+        return {}
+
+    monkeypatch.setattr(translation, "_update", update)
+    translation.train(frames, frames, iterations=1, seed=0, width=2)
+    assert shapes == 2 * [(4, 3, 84, 84)]
+
+
 def test_averaged_weights_remember_little_at_first_and_two_hundred_steps_later():
     average, model = nn.Linear(1, 1), nn.Linear(1, 1)
     for step, share in ((1, 10 / 11), (10, 1 / 2), (100_000, 1 / 200)):

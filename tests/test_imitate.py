@@ -1,5 +1,7 @@
 """The method as a whole, on data too small to learn anything from."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from gymnasium.envs.registration import EnvSpec
@@ -14,7 +16,10 @@ from lbw_minimal.imitate import (
     make_reward,
     watched,
 )
+from lbw_minimal.munit import MUNIT
 from lbw_minimal.training import InputError
+from lbw_minimal.transporter import Transporter
+from tasks import TASKS, WEIGHTS
 
 TINY = Recipe(
     human_frames=6, robot_frames=6, munit_iterations=1, munit_width=4, transporter_iterations=1
@@ -53,6 +58,24 @@ def watcher():
     perception.z_E = way
     perception.detect = lambda frames: np.cumsum(np.full((len(frames), 2, 2), 0.02), axis=0)
     return perception
+
+
+def test_the_robots_pace_is_that_of_400_frames(watcher):
+    asked = []
+    watcher = replace(watcher)
+    watcher.z_E = np.cumsum(np.full((30, 2, 2), 0.02), axis=0)
+    watcher.detect = lambda frames: (
+        asked.append(len(frames)) or np.cumsum(np.full((len(frames), 2, 2), 0.02), axis=0)
+    )
+    make_reward(watcher, np.zeros((500, 84, 84, 3), np.uint8))
+    assert asked == [400]
+
+
+@pytest.mark.parametrize("task", TASKS)
+def test_a_training_has_the_sizes_of_the_shipped_perception(task):
+    perception = load_perception(WEIGHTS / task, task)
+    assert perception.translator.sizes == MUNIT().sizes
+    assert perception.detector.K == Transporter().K == 5
 
 
 def test_a_form_of_reward_that_does_not_exist_is_refused(watcher):

@@ -156,6 +156,15 @@ def test_a_take_that_fails_at_its_end_is_filmed_again(monkeypatch):
     assert [recording.seed for _, _, recording in expert_takes(None, 3)] == [1, 3, 5]
 
 
+def test_an_expert_that_fails_two_of_three_times_is_given_up(monkeypatch):
+    take = None, None, Recording(0, False, None, None, None, np.array([True, False]))
+    tried = []
+    monkeypatch.setattr("tasks.world.motion.record_expert", lambda *a: tried.append(a) or take)
+    with pytest.raises(InputError, match="nonetype: its expert succeeds in 0 of 6 tries"):
+        list(expert_takes(None, 2))
+    assert len(tried) == 6
+
+
 def features(states):
     """Where tip and object are along x and z (T, 9) -> and all products of two of them (T, 15)."""
     x = np.concatenate([np.ones((len(states), 1)), states[:, [0, 2, 3, 5]]], axis=1)

@@ -68,6 +68,18 @@ def test_the_published_size_is_that_of_the_publication():
     assert {"critic_loss", "reconstruction"} < set(agent.update(batch_of(2)))
 
 
+def test_the_slim_size_is_that_of_the_papers_table(monkeypatch):
+    """With one update a step after 500 random actions."""
+    agent, asked = small(), {}
+    assert (
+        agent.critic.weights[0].shape == (2, 50 + 2, 256) and agent.actor.net[0].out_features == 256
+    )
+    assert (agent.gamma, agent.alpha, agent.target_entropy) == (0.95, pytest.approx(0.02), -2)
+    monkeypatch.setattr(sac_ae, "learn", lambda *_, **more: asked.update(more) or [])
+    train(dot(), steps=7, seed=0)
+    assert (asked["updates"], asked["batch"], asked["random_steps"]) == (1, 64, 500)
+
+
 def test_a_patch_is_a_position_and_its_pixels_are_channels():
     frames = torch.zeros(1, 3, *SHAPE)
     frames[0, 2, 4 * 5 + 1, 4 * 7 + 3, 1] = 255  # frame 2, row 1 and column 3 of the patch, green

@@ -314,6 +314,7 @@ def test_training_starts_wide_and_ends_narrow_and_learns_along_a_cosine(monkeypa
     seen = []
 
     def update(model, optimizer, x, y, median, early, shift, hue):
+        assert optimizer.param_groups[0]["betas"] == (0.9, 0.99)
         assert model.training and x.shape == y.shape == (32, 3, 84, 84)
         assert set(y.unique().tolist()) == {-1, 1} and (median == -1).all()
         seen.append((early, optimizer.param_groups[0]["lr"], shift, hue))

@@ -220,6 +220,23 @@ def test_a_film_that_is_taken_whole_is_not_searched_for_cuts(monkeypatch):
     assert len(video.read(SHIPPED / "push" / "random.mp4", whole=True)[0]) == 351
 
 
+def test_steadiness_by_hand():
+    """On a ramp of 4 levels a pixel 3.9 levels are less than a pixel, and 4.1 are more.
+
+    The steadiest two fifths count. What is flatter than 3 levels a pixel is no edge.
+    """
+    x = np.arange(20, dtype=np.float32)
+    ramp, flat = np.tile(4 * x, (20, 1)), np.tile(2.9 * x, (20, 1))
+    stays, goes = ramp + 3.9, ramp + 4.1
+    assert video.steadiness(np.stack([stays, stays, stays, goes]), ramp) == 0.75
+    for rows, steady in ((11, 1), (13, 0)):
+        part = stays.copy()
+        part[:rows] = goes[:rows]
+        assert video.steadiness(part[None], ramp) == steady
+    assert video.steadiness(flat[None] + 50, flat) == 1
+    assert video.steadiness(flat[None] * 1.1 + 50, flat * 1.1) == 0
+
+
 def test_enlarged_film_for_a_report_shows_the_same(tmp_path):
     video.write(tmp_path / "mine.mp4", film(), 25, scale=4)
     assert cv2.VideoCapture(str(tmp_path / "mine.mp4")).get(cv2.CAP_PROP_FRAME_WIDTH) == 336
