@@ -59,12 +59,16 @@ img { max-width: 100% }
   pre { white-space: pre-wrap !important; overflow-wrap: anywhere }
 }
 .jp-InputPrompt, .jp-OutputPrompt { opacity: 1 !important }
+details { border-left: 3px solid #ddd; padding-left: .8rem; margin: .6rem 0 }
+summary { cursor: pointer; color: #444 }
 /* nbconvert's colours, dark enough for small type on grey: 4.5 to 1 and more */
 .highlight .o, .highlight .ow { color: #8414c8 !important }
 .highlight .c1 { color: #356e6e !important }
 .highlight .mi, .highlight .mf { color: #007000 !important }
 @media print {
   nav, iframe { display: none !important }
+  /* What is folded is open on paper, where nobody can unfold it. */
+  details::details-content { content-visibility: visible !important; block-size: auto !important }
   .jp-InputArea-editor, .jp-OutputArea-output { overflow: visible !important }
   figure, img, tr { break-inside: avoid }
   h1, h2, h3 { break-after: avoid }
@@ -76,6 +80,7 @@ body { font: 17px/1.5 system-ui, sans-serif; max-width: 46rem; margin: 3rem auto
 li { margin: .7rem 0; list-style: none } ul { padding: 0 } a { color: #0072b2; font-weight: 600 }
 p { margin: .1rem 0 }
 """
+LINK = re.compile(r"\]\((\d\d_\w+)\.ipynb")
 MATH = re.compile(r"(`+.*?`+)|\$\$(.+?)\$\$|\$([^$\n]+?)\$", re.DOTALL)
 # What PyBullet prints to everybody who imports it.
 GREETING = re.compile(r"(pybullet build time: .*|argv\[0\]=)\n?")
@@ -177,7 +182,7 @@ def page(notebook: nbformat.NotebookNode, source: Path) -> str:
 
     for cell in notebook.cells:
         if cell.cell_type == "markdown":
-            cell.source = MATH.sub(keep, cell.source)
+            cell.source = MATH.sub(keep, LINK.sub(r"](\1.html", cell.source))
         for output in list(cell.get("outputs", [])):
             # A progress bar: as it stood at its end, and no error.
             if "\r" in output.get("text", ""):
@@ -189,7 +194,8 @@ def page(notebook: nbformat.NotebookNode, source: Path) -> str:
                 said = output.metadata.get("image/png", {}).get("alt", "")
                 uri = f"data:image/png;base64,{''.join(png.split())}"
                 output.data = {"text/html": f'<img alt="{escape(said)}" src="{uri}">'}
-    exporter = HTMLExporter(embed_images=True, mathjax_url="", require_js_url="")
+    # With embed_images each piece of HTML would be closed by itself, and what is folded be empty.
+    exporter = HTMLExporter(mathjax_url="", require_js_url="")
     exporter.exclude_anchor_links = True
     name = {"metadata": {"name": escape(opening(source)[0])}}
     html, _ = exporter.from_notebook_node(notebook, name)

@@ -60,13 +60,17 @@ AUDIT = """
 """.replace("LEAST", str(LEAST))
 FINE = {"faint": [], "cut": [], "no alt": 0, "no title": 0, "too wide": 0}
 FINE |= {"no viewport": 0, "no language": 0}
-# Blocks whose content does not fit on the paper, and whether a scene or its picture is printed.
+# Blocks whose content does not fit on the paper, whether a scene or its picture is printed, and
+# what is folded there, where nobody can unfold it.
 PAPER = """
 (() => {
   const shown = [...document.querySelectorAll("body *")].filter(e => e.checkVisibility());
   const far = shown.filter(e => e.getBoundingClientRect().right > innerWidth + 1
     || (e.scrollWidth > e.clientWidth + 2 && e.clientWidth > 0 && e.tagName !== "SPAN"));
+  const folds = [...document.querySelectorAll("details")];
   return {
+    folds: folds.length,
+    folded: folds.filter(e => !e.lastElementChild.checkVisibility()).length,
     cut: far.map(e => e.tagName + "." + e.className),
     scenes: shown.filter(e => e.tagName === "IFRAME").length,
     stills: shown.filter(e => e.className === "still" && e.clientHeight > 50).length,
@@ -105,7 +109,8 @@ def book_page():
 
 BAD = """<!doctype html><p style="opacity: 0.5; color: #616161">faint</p>
 <img src="data:,"><iframe></iframe><div style="width: 3000px">wide</div>
-<div class="x" style="overflow: hidden; width: 9px">clipped</div>"""
+<div class="x" style="overflow: hidden; width: 9px">clipped</div>
+<details><summary>folded</summary><p>hidden</p></details>"""
 NAMES = ["book.html", "contents.html", "report.html", "feedback.html"]
 
 
@@ -167,13 +172,14 @@ def test_a_page_is_whole_on_paper(seen, name):
     paper = seen[name][2]
     assert paper["cut"] == [] and paper["scenes"] == 0
     assert paper["stills"] == (name == "book.html")
+    assert paper["folded"] == 0 and (paper["folds"] > 5) == (name == "book.html")
 
 
 def test_what_is_wrong_with_a_page_is_noticed(seen):
     wide, _, paper = seen["bad.html"]
     assert wide["faint"][0] == ["faint", pytest.approx(2.17, abs=0.01)]
     assert wide["cut"] == ["x"] and all(wide[name] for name in FINE)
-    assert paper["cut"] and paper["scenes"] == 1
+    assert paper["cut"] and paper["scenes"] == 1 and paper["folded"] == 1
 
 
 def test_a_figure_is_described_by_its_own_words():
