@@ -8,6 +8,7 @@ import pytest
 from PIL import Image
 from toy_clips import add, add_sound, encode, reach, room
 
+from lbw_minimal.clips.decoding import look
 from lbw_minimal.clips.reader import read_clip
 from lbw_minimal.training import InputError
 
@@ -150,6 +151,13 @@ def test_a_file_that_may_not_be_read_says_so(tmp_path):
     encode(tmp_path / "mine.mp4", reach()).chmod(0)
     with pytest.raises(InputError, match="Permission denied"):
         read_clip(tmp_path / "mine.mp4")
+
+
+def test_a_title_may_be_no_utf8(tmp_path):
+    path = encode(tmp_path / "a.mp4", reach(), metadata={"title": "Mxxller"})
+    assert path.read_bytes().count(b"Mxxller") == 1
+    path.write_bytes(path.read_bytes().replace(b"Mxxller", b"M\xfc\xe9ller"))
+    assert look(path)[1]["title"] == "M\udcfc\udce9ller"
 
 
 def test_zeros_behind_a_film_do_no_harm(tmp_path):

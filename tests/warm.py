@@ -20,7 +20,8 @@ from bisect import bisect
 
 import pytest
 
-MODULES = "av cv2 gymnasium.wrappers matplotlib meshcat numpy PIL safetensors.torch torch._dynamo torch.nn"
+MODULES = """av cv2 gymnasium.wrappers matplotlib meshcat numpy PIL safetensors.torch torch._dynamo
+    torch.nn"""
 BANDS = (0.2, 1.0, 5.0)  # s: brief tests first, and within a band as they stand
 NO_TESTS = pytest.ExitCode.NO_TESTS_COLLECTED
 SLACK, LEAST, UNKNOWN = 5, 20, 60  # a test hangs after 5 times its own seconds, 20 s at least

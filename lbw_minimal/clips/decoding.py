@@ -29,6 +29,9 @@ NO_FILM = {
 STILL = "this is a still picture; give a video in which the arm does the task."
 # With more threads a 4K film of 10 bits takes hundreds of megabytes for frames under way.
 THREADS = min(4, os.cpu_count() or 1)
+# A title may be no UTF-8. PyAV 19, for Python 3.12 and later, takes it as it is; 18 has to be told.
+PYAV = int(av.__version__.partition(".")[0])
+ODD_TEXT = {} if PYAV >= 19 else {"metadata_errors": "surrogateescape"}
 
 
 @dataclass(frozen=True)
@@ -80,7 +83,7 @@ def look(path: Path) -> tuple[list[Stream], dict[str, str]]:
 def _open(file):
     """The container in an open file. A file's name never reaches FFmpeg's protocols and patterns,
     for which a colon and a percent sign have meanings."""
-    return av.open(file, buffer_size=1 << 20, metadata_errors="replace")
+    return av.open(file, buffer_size=1 << 20, **ODD_TEXT)
 
 
 def _describe(stream, seconds):
