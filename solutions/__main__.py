@@ -1,10 +1,10 @@
 """The course is made from the notebooks in this folder.
 
 `python -m solutions release` writes the student version to `notebooks/`, by nbgrader's own
-preprocessors. `python -m solutions archive` writes the kit without the solved notebooks to
-`runs/lbw.zip`, for students. `python -m solutions book` executes the solutions and writes them as
-web pages to `runs/book/`, which need no network: equations are MathML, pictures and scenes are in
-the pages.
+preprocessors, and the glossary beside it. `python -m solutions archive` writes the kit without the
+solved notebooks to `runs/lbw.zip`, for students. `python -m solutions book` executes the solutions
+and writes them as web pages to `runs/book/`, which need no network: equations are MathML, pictures
+and scenes are in the pages.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from tests.grade.cell.answer import STUB
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
-NOTEBOOKS = ROOT / "notebooks"
+NOTEBOOKS, GLOSSARY = ROOT / "notebooks", HERE / "GLOSSARY.md"
 BOOK, ARCHIVE = ROOT / "runs" / "book", ROOT / "runs" / "lbw.zip"
 TIMEOUT = 1800  # s, for one cell
 # What the kernel does before the first cell, for the figures' alt texts.
@@ -123,6 +123,7 @@ def release() -> None:
     """Write `notebooks/` anew. Raises InputError if there are no solved notebooks."""
     for source in wanted([]):
         write_atomic(NOTEBOOKS / source.name, student(source))
+    write_atomic(NOTEBOOKS / GLOSSARY.name, GLOSSARY.read_text(encoding="utf-8"))
 
 
 def archive(path: Path = ARCHIVE) -> None:
@@ -163,6 +164,11 @@ def mathml(found: re.Match) -> str:
     return found[1] or convert(found[2] or found[3], display="block" if found[2] else "inline")
 
 
+def linked(text: str) -> str:
+    """Markdown whose links to notebooks and to the glossary lead to their pages in the book."""
+    return LINK.sub(r"](\1.html", text.replace(f"]({GLOSSARY.name}", "](glossary.html"))
+
+
 def opening(source: Path) -> tuple[str, str]:
     """The notebook's title and its question, with equations as MathML."""
     text = nbformat.read(source, as_version=4).cells[0].source
@@ -182,7 +188,7 @@ def page(notebook: nbformat.NotebookNode, source: Path) -> str:
 
     for cell in notebook.cells:
         if cell.cell_type == "markdown":
-            cell.source = MATH.sub(keep, LINK.sub(r"](\1.html", cell.source))
+            cell.source = MATH.sub(keep, linked(cell.source))
         for output in list(cell.get("outputs", [])):
             # A progress bar: as it stood at its end, and no error.
             if "\r" in output.get("text", ""):
@@ -197,20 +203,29 @@ def page(notebook: nbformat.NotebookNode, source: Path) -> str:
     # With embed_images each piece of HTML would be closed by itself, and what is folded be empty.
     exporter = HTMLExporter(mathjax_url="", require_js_url="")
     exporter.exclude_anchor_links = True
-    name = {"metadata": {"name": escape(opening(source)[0])}}
+    name = {"metadata": {"name": escape(notebook.cells[0].source.splitlines()[0].lstrip("# "))}}
     html, _ = exporter.from_notebook_node(notebook, name)
     # Mermaid would come from the network.
     html = re.sub(r'<script type="module">.*?</script>', "", html, flags=re.DOTALL)
     html = re.sub(r"EQUATION(\d+)HERE", lambda m: equations[int(m[1])], html)
+    links = ['<a href="index.html">contents</a>', '<a href="glossary.html">glossary</a>']
     order = sources()
-    i = order.index(source)
-    links = ['<a href="index.html">contents</a>']
-    for near in (*order[max(0, i - 1) : i], *order[i + 1 : i + 2]):
-        links.append(f'<a href="{near.stem}.html">{opening(near)[0]}</a>')
+    if source in order:  # and not the glossary
+        i = order.index(source)
+        for near in (*order[max(0, i - 1) : i], *order[i + 1 : i + 2]):
+            links.append(f'<a href="{near.stem}.html">{opening(near)[0]}</a>')
     switch = '<label><input type="checkbox" id="plain"> hide the code</label>'
     bar = f"<nav>{''.join(links)}{switch}</nav>"
     html = html.replace("</head>", f"<style>{STYLE}</style></head>", 1)
     return re.sub(r"(<body[^>]*>)", lambda found: found[1] + bar, html, count=1)
+
+
+def glossary() -> str:
+    """The glossary as a page, whose terms can be linked to by their names."""
+    cell = nbformat.v4.new_markdown_cell(GLOSSARY.read_text(encoding="utf-8"))
+    html = page(nbformat.v4.new_notebook(cells=[cell]), GLOSSARY)
+    named = '<h2 id="{}">{}</h2>'
+    return re.sub("<h2>(.*?)</h2>", lambda m: named.format(m[1].replace(" ", "-"), m[1]), html)
 
 
 def contents() -> str:
@@ -219,6 +234,7 @@ def contents() -> str:
     for source in sources():
         title, question = opening(source)
         rows.append(f'<li><a href="{source.stem}.html">{title}</a><p>{question}</p></li>')
+    rows.append('<li><a href="glossary.html">Words of the field</a></li>')
     title = "LbW minimal, the course"
     return (
         f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{title}</title>'
@@ -235,6 +251,7 @@ def book(only: list[str]) -> int:
     asked, failed = wanted(only), 0
     BOOK.mkdir(parents=True, exist_ok=True)
     write_atomic(BOOK / "index.html", contents())
+    write_atomic(BOOK / "glossary.html", glossary())
     for source in asked:
         print(source.stem, flush=True)
         try:

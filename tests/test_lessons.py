@@ -8,7 +8,7 @@ from pathlib import Path
 import nbformat
 import pytest
 
-from solutions.__main__ import MATH, NOTEBOOKS, page, sources
+from solutions.__main__ import GLOSSARY, MATH, NOTEBOOKS, glossary, page, sources
 from tests.grade.exercise import everything
 
 ALL = everything()
@@ -201,3 +201,77 @@ def test_in_the_book_folds_hold_their_text_and_links_lead_to_pages(path):
     pages = set(re.findall(r'href="(\d\d_\w+\.\w+)"', html))
     assert {Path(name).stem for name in pages} <= {p.stem for p in SOURCES}
     assert {Path(name).suffix for name in pages} == {".html"}
+
+
+TERM = re.compile(r"\[([^\]]+)\]\(GLOSSARY\.md#([^)]+)\)")
+# What no term is linked in: code, equations, headings, tables, other links, what is folded, and
+# the first lines of a notebook.
+ELSEWHERE = re.compile(
+    r"(?s)`+[^`]*`+|\$\$.*?\$\$|\$[^$\n]+\$|(?m:^(?:#|\||    ).*$)|<details>.*?</details>"
+    r"|\*\*(?:Where you are|The question)\.\*\*.*?\n\n|\[[^\]]*\]\((?!GLOSSARY)[^)]*\)"
+    r"|\*\*Exercise[^*]*\*\*|## What to read next.*"
+)
+
+
+def terms():
+    """Term -> its text, as the glossary has them."""
+    parts = re.split(r"(?m)^## (.*)$", GLOSSARY.read_text(encoding="utf-8"))
+    return dict(zip(parts[1::2], parts[2::2], strict=True))
+
+
+def too_late(prose):
+    """Terms that stand in a text before the place where they lead to the glossary."""
+    for found in TERM.finditer(prose):
+        before = TERM.sub("", prose[: found.start()])
+        if re.search(rf"(?<![\w-]){re.escape(found[1])}(?![\w-])", before):
+            yield found[1]
+
+
+def test_the_glossary_is_in_order_and_its_terms_have_one_name_everywhere():
+    """GitHub, JupyterLab and the book agree on small letters and spaces, and on nothing else."""
+    assert [*terms()] == sorted(terms()) and len(terms()) > 30
+    assert all(re.fullmatch("[a-z]+([ -][a-z]+)*", name) for name in terms())
+    html = glossary()
+    assert all(f'id="{name.replace(" ", "-")}"' in html for name in terms())
+
+
+@pytest.mark.parametrize("term", terms())
+def test_a_term_is_explained_in_a_sentence_or_two_and_says_where_it_is_at_home(term):
+    said = terms()[term]
+    explained, _, home = said.partition("[")
+    assert len(re.findall(r"[.:;](?:\s|$)", explained)) <= 4 and len(explained.split()) < 50
+    assert "ipynb" in home or "of the paper" in said
+    assert any(id == term.replace(" ", "-") for p in SOURCES for _, id in TERM.findall(all_of(p)))
+
+
+def all_of(path):
+    return "\n\n".join(texts(path))
+
+
+@by_name
+def test_a_term_leads_to_the_glossary_once_and_where_it_is_used_first(path):
+    names = {name.replace(" ", "-") for name in terms()}
+    linked = [id for _, id in TERM.findall(all_of(path))]
+    assert set(linked) <= names and len(linked) == len(set(linked)) > 2
+    assert not [*too_late(ELSEWHERE.sub(" ", all_of(path)))]
+
+
+def test_a_term_that_is_linked_too_late_is_noticed():
+    prose = "A policy acts. The [policy](GLOSSARY.md#policy) is a density."
+    assert [*too_late(prose)] == ["policy"]
+    assert not [*too_late("Polices act. The [policy](GLOSSARY.md#policy) is a density. A policy.")]
+
+
+@by_name
+def test_a_preprint_that_is_named_can_be_clicked(path):
+    assert not re.search(r"(?<!\[)(?i:arxiv) \d{4}\.", all_of(path))
+    for number, target in re.findall(r"\[arXiv ([\d.]+)\]\((.*?)\)", all_of(path)):
+        assert target == f"https://arxiv.org/abs/{number}"
+
+
+@pytest.mark.parametrize(
+    ("number", "section"), [(4, "III-A"), (5, "III-B"), (6, "IV-C")], ids=["4", "5", "6"]
+)
+def test_the_papers_equations_lead_to_the_paper(number, section):
+    link = f"[the paper, section {section}](https://arxiv.org/abs/2101.07241)"
+    assert link in all_of(SOURCES[number])

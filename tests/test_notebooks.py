@@ -9,7 +9,17 @@ import nbformat
 import pytest
 from nbconvert.preprocessors import ExecutePreprocessor
 
-from solutions.__main__ import HERE, MATH, NOTEBOOKS, ROOT, contents, page, sources, student
+from solutions.__main__ import (
+    GLOSSARY,
+    HERE,
+    MATH,
+    NOTEBOOKS,
+    ROOT,
+    contents,
+    page,
+    sources,
+    student,
+)
 from tests.grade.__main__ import grade, main
 from tests.grade.cell.answer import STUB
 from tests.grade.exercise import everything
@@ -43,8 +53,10 @@ def test_the_student_version_is_made_from_the_source(path):
     assert (NOTEBOOKS / path.name).read_text() == student(path)
 
 
-def test_nothing_else_is_among_the_notebooks():
-    assert sorted(p.name for p in NOTEBOOKS.iterdir()) == [p.name for p in SOURCES]
+def test_nothing_but_the_glossary_is_among_the_notebooks():
+    made = [*SOURCES, GLOSSARY]
+    assert sorted(p.name for p in NOTEBOOKS.iterdir()) == [p.name for p in made]
+    assert (NOTEBOOKS / GLOSSARY.name).read_text() == GLOSSARY.read_text()
 
 
 @by_name
@@ -232,4 +244,5 @@ def test_a_page_of_the_book_needs_no_network_and_no_script_for_its_equations():
 
 def test_the_books_contents_ask_every_notebooks_question():
     html = contents()
-    assert html.count("<li>") == len(SOURCES) and html.count("?") >= len(SOURCES)
+    assert html.count("<li>") == len(SOURCES) + 1 and "glossary.html" in html
+    assert html.count("?") >= len(SOURCES)

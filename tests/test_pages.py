@@ -6,6 +6,7 @@ import re
 import nbformat
 import numpy as np
 import pytest
+from jupyter_server.services.config.manager import ConfigManager
 from jupyterlab_server.config import get_page_config
 
 import tests.test_report as a_run
@@ -111,7 +112,7 @@ BAD = """<!doctype html><p style="opacity: 0.5; color: #616161">faint</p>
 <img src="data:,"><iframe></iframe><div style="width: 3000px">wide</div>
 <div class="x" style="overflow: hidden; width: 9px">clipped</div>
 <details><summary>folded</summary><p>hidden</p></details>"""
-NAMES = ["book.html", "contents.html", "report.html", "feedback.html"]
+NAMES = ["book.html", "contents.html", "glossary.html", "report.html", "feedback.html"]
 
 
 def write_pages(folder):
@@ -119,6 +120,7 @@ def write_pages(folder):
     (folder / "bad.html").write_text(BAD)
     (folder / "book.html").write_text(book_page())
     (folder / "contents.html").write_text(course.contents())
+    (folder / "glossary.html").write_text(course.glossary())
     report.write_report(folder / "report.html", **a_run.example())
     outcomes = [
         {"label": "the value", "points": 0, "most": 2, "message": "the sign is wrong"},
@@ -214,6 +216,15 @@ def test_students_do_not_see_nbgraders_buttons(monkeypatch):
     assert "@jupyter/nbgrader" in get_page_config([])["disabledExtensions"]
     monkeypatch.delenv("JUPYTER_CONFIG_PATH")
     assert "@jupyter/nbgrader" not in get_page_config([])["disabledExtensions"]
+
+
+def test_students_read_the_glossary_and_not_its_source(monkeypatch):
+    """JupyterLab opens Markdown as a page where `make lab` starts it."""
+    line = re.search(r"JUPYTER_CONFIG_PATH=\$\(CURDIR\)/(\S+) .*jupyter lab", _makefile())
+    monkeypatch.setenv("JUPYTER_CONFIG_PATH", str(course.ROOT / line[1]))
+    said = ConfigManager(config_dir_name="labconfig").get("default_setting_overrides")
+    viewers = said["@jupyterlab/docmanager-extension:plugin"]["defaultViewers"]
+    assert viewers == {"markdown": "Markdown Preview"}
 
 
 def _makefile():
