@@ -179,13 +179,17 @@ class Clock:
         monkeypatch.setattr(training.time, "monotonic", lambda: self.now)
 
 
-def test_checkpoint_saves_only_when_its_seconds_have_passed(tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("seconds", "saved"), [({}, [21, 42]), ({"seconds": 9}, [10, 20, 30, 40, 50])]
+)
+def test_checkpoint_saves_only_when_its_seconds_have_passed(tmp_path, monkeypatch, seconds, saved):
+    """Twenty, if nobody says how many."""
     clock, made = Clock(monkeypatch), []
-    checkpoint = Checkpoint(tmp_path / "state", seconds=20)
+    checkpoint = Checkpoint(tmp_path / "state", **seconds)
     for second in range(60):
         clock.now = 1000.0 + second
         checkpoint.save(lambda second=second: made.append(second) or {"second": second})
-    assert made == [21, 42]
+    assert made == saved
 
 
 def test_forced_checkpoint_does_not_wait(tmp_path):

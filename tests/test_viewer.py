@@ -351,6 +351,9 @@ def test_edges_are_shaded_sharp_and_round_surfaces_round():
     for bend, same in ((a, True), (np.pi / 2, False)):
         left = [[-1, 0, 0], [0, 0, 0], [0, 1, 0]]
         right = [[0, 1, 0], [0, 0, 0], [np.cos(bend), 0, np.sin(bend)]]
-        n = normals(np.array([left, right], float))
+        corners = np.array([left, right], float)
+        n = normals(corners)
         assert np.allclose(n[0, 1], n[1, 1]) == same
+        small_and_far = 0.001 * corners + (1000, 0, 0)
+        np.testing.assert_allclose(normals(small_and_far), n, atol=1e-6)
     np.testing.assert_allclose(n[0], [[0, 0, 1]] * 3, atol=1e-12)
