@@ -127,7 +127,7 @@ def release() -> None:
 
 
 def archive(path: Path = ARCHIVE) -> None:
-    """Write the kit's own files but for the solved notebooks to a zip, in a folder `lbw`.
+    """Write the kit's own files but for what `notebooks/` is made of to a zip, in a folder `lbw`.
 
     Raises InputError if git does not know which files are the kit's.
     """
@@ -142,7 +142,7 @@ def archive(path: Path = ARCHIVE) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     with ZipFile(path, "w", ZIP_DEFLATED) as out:
         for name in filter(None, listed.split("\0")):
-            if ROOT / name not in sources():
+            if ROOT / name not in (*sources(), GLOSSARY):
                 out.write(ROOT / name, f"lbw/{name}")
 
 

@@ -9,7 +9,7 @@ from zipfile import ZipFile
 import nbformat
 import pytest
 
-from solutions.__main__ import ARCHIVE, ROOT, archive, main, sources
+from solutions.__main__ import ARCHIVE, GLOSSARY, ROOT, archive, main, sources
 
 MADE = {"tasks/domino.py", "solutions/weights/mytask"}  # by the reader
 OURS = ("lbw_minimal", "notebooks", "solutions", "tasks", "tests")
@@ -43,11 +43,11 @@ def anchors(text):
         yield re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-")
 
 
-def test_the_solved_notebooks_and_nothing_else_are_left_out(kit):
+def test_what_the_notebooks_are_made_of_and_nothing_else_is_left_out(kit):
     said = subprocess.check_output(["git", "ls-files"], cwd=ROOT, text=True).splitlines()
     ours = {name for name in said if (ROOT / name).exists()}
     packed = {p.relative_to(kit).as_posix() for p in kit.rglob("*") if p.is_file()}
-    assert ours - packed == {p.relative_to(ROOT).as_posix() for p in sources()}
+    assert ours - packed == {p.relative_to(ROOT).as_posix() for p in (*sources(), GLOSSARY)}
     assert packed <= ours
 
 
