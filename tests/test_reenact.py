@@ -101,10 +101,10 @@ def test_after_a_hit_the_hand_rests_for_as_long_as_a_puck_slides():
 
 
 def test_a_hit_alone_becomes_faster_from_the_run_up_to_the_stop():
-    motion = along(0, 0, 0, 1, 2, 2, 2, contact=3, arrival=4)
+    motion = along(0, 0, 0, 0, 1, 2, 2, 2, contact=4, arrival=5)
     fast, slow = (module._faster(motion, factor).tip[:, 0] for factor in (2.0, 0.5))
-    assert fast.tolist() == pytest.approx([0, 0, 0, 2, 2, 2])
-    assert slow.tolist() == pytest.approx([0, 0, 0, 0.5, 1, 1.5, 2, 2, 2])
+    assert fast.tolist() == pytest.approx([0, 0, 0, 0, 2, 2, 2])
+    assert slow.tolist() == pytest.approx([0, 0, 0, 0, 0.5, 1, 1.5, 2, 2, 2])
     at_once = module._faster(along(0, 1, 2, 2), 0.5).tip[:, 0]
     assert at_once.tolist() == pytest.approx([0, 0.5, 1, 1.5, 2, 2])
 

@@ -282,7 +282,9 @@ def test_an_update_descends_the_three_losses_of_what_the_augmented_frames_show(e
     monkeypatch.setattr(tp, "recoloured", lambda v, most: asked.append((v, most)) or bright)
     monkeypatch.setattr(tp, "degraded", lambda v: asked.append((v, None)) or v + 0.05)
     expected = plain_update(model, x, y, median, early, bright + 0.05, moved)
-    tp._update(model, torch.optim.SGD(model.parameters(), 1.0), x, y, median, early, 3, 180)
+    spread = model.keypoints(bright + 0.05).std(0).mean(-1).tolist()
+    told = tp._update(model, torch.optim.SGD(model.parameters(), 1.0), x, y, median, early, 3, 180)
+    assert told["keypoint_std"] == pytest.approx(spread)
     for p, wanted in zip(model.parameters(), expected, strict=True):
         torch.testing.assert_close(p, wanted, atol=1e-5, rtol=1e-4)
     assert [most for _, most in asked] == [3, 180, None]
