@@ -11,6 +11,7 @@ import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import av
 import av.filter
@@ -31,7 +32,7 @@ STILL = "this is a still picture; give a video in which the arm does the task."
 THREADS = min(4, os.cpu_count() or 1)
 # A title may be no UTF-8. PyAV 19, for Python 3.12 and later, takes it as it is; 18 has to be told.
 PYAV = int(av.__version__.partition(".")[0])
-ODD_TEXT = {} if PYAV >= 19 else {"metadata_errors": "surrogateescape"}
+ODD_TEXT: dict[str, Any] = {} if PYAV >= 19 else {"metadata_errors": "surrogateescape"}
 
 
 @dataclass(frozen=True)
