@@ -1,5 +1,6 @@
 """The paper's page: which runs it asks for, its tables by hand, and that it stands alone."""
 
+import json
 import re
 
 import numpy as np
@@ -7,8 +8,8 @@ import pytest
 from matplotlib.figure import Figure
 
 import tasks
-from tasks.commands import figures, paper, table
-from tasks.commands.batch import folder
+from tasks.commands import controls, figures, paper, table
+from tasks.commands.batch import folder, read
 
 
 def plan(out, **more):
@@ -136,3 +137,25 @@ def test_the_order_of_methods_is_held_against_the_papers():
     assert "- coffee: AVID-m is not to be told from LbW, in the paper below it" in lines
     assert "- drawer: Classifier reward is below AVID-m, in the paper above it" in lines
     assert sum(line.startswith("-") for line in lines) == 2 + 3 + 2
+
+
+def test_the_shipped_page_is_that_of_the_shipped_runs():
+    results = tasks.ROOT / "solutions" / "results" / "paper"
+    asked, runs = plan(results, episodes=100), {}
+    for task, seed, change in paper.wanted(asked):
+        runs.setdefault((task, change), []).append(read(asked.runs, task, seed, change))
+    page = (results / "paper.md").read_text(encoding="utf-8")
+    for made in (table.table_two, table.order, table.every_run):
+        assert made(runs) in page
+    for made in (paper.trained_wide, paper.long_runs, paper.over_videos):
+        assert made(runs) in page
+    assert all(row["episodes"] == 100 for some in runs.values() for row in some)
+    notes = [json.loads((results / "controls" / f"{t}.json").read_text()) for t in tasks.TASKS]
+    assert all(note["episodes"] == 100 and controls.table(note) in page for note in notes)
+    assert controls.eyes_pay(notes) in page
+    assert paper.needs_eyes_wide(asked) in page
+    assert paper.perception(asked) in page
+    for name in re.findall(r"\(figures/(\S+)\)", page):
+        assert (results / "figures" / name).exists()
+    readme = (tasks.ROOT / "README.md").read_text(encoding="utf-8")
+    assert table.table_two(runs) in readme and controls.eyes_pay(notes) in readme

@@ -1,6 +1,5 @@
 """The tables: figures worked out by hand, finished runs left alone, failed ones named."""
 
-import itertools
 import json
 import shutil
 from importlib import import_module
@@ -224,19 +223,3 @@ def test_runs_with_moved_starts_are_as_good_as_their_table_says():
         lines.append([task, f"{wins}/{n}", f"{low}-{high} %"])
     text = table.markdown(["task", "success", "95 % interval"], lines)
     assert text in (RESULTS / "README.md").read_text()
-
-
-def test_the_shipped_table_two_is_that_of_the_shipped_runs():
-    results = RESULTS / "paper"
-    seeds = {"": 3, "classifier": 2, "avid": 2}
-    runs = {}
-    for (change, n), task in itertools.product(seeds.items(), TASKS):
-        jobs = [(task, seed, change) for seed in range(n)]
-        done = [job for job in jobs if batch.folder(results / "runs", *job).exists()]
-        if done:
-            runs[task, change] = [batch.read(results / "runs", *job) for job in done]
-    text = (results / "table.md").read_text(encoding="utf-8")
-    assert table.table_two(runs) in text
-    for (task, change), some in runs.items():
-        assert f"| {table.METHODS[change][0]} | {task} | {table.each(some)} |" in text
-    assert table.table_two(runs) in (ROOT / "README.md").read_text(encoding="utf-8")
