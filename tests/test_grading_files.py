@@ -17,12 +17,13 @@ import pytest
 
 import tests.grade.__main__ as grading
 from tests.grade import files, sandbox
-from tests.grade.__main__ import harmless, main, safe
+from tests.grade.__main__ import main, safe
 from tests.grade.cell.answer import STUB
 from tests.grade.exercise import everything, find
 from tests.grade.files import File, in_order, printable, released
 from tests.grade.handed_in import Submission, is_one, submissions, wanted
 from tests.grade.judge import Outcome, Result
+from tests.grade.sheets import harmless
 from tests.grade.submission import Unreadable, parse
 
 E61 = find("6.1")

@@ -10,10 +10,8 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import csv
 import functools
 import hashlib
-import io
 import json
 import math
 import queue
@@ -34,7 +32,9 @@ from tests.grade.exercise import Exercise, everything
 from tests.grade.files import File, in_order, printable
 from tests.grade.handed_in import Submission, submissions, wanted
 from tests.grade.judge import UNDONE, Result, best, judge, nothing
+from tests.grade.reports import reports
 from tests.grade.sandbox import Lost, Sandbox
+from tests.grade.sheets import sheet
 from tests.grade.submission import Answer, Notebook, Unreadable, answer, parse
 
 SEED = 2  # of one submission alone; students check themselves with 0
@@ -83,6 +83,7 @@ def main(argv=None) -> int:
     ]
     if not written[0]:
         say(table(grades, ids))
+    written += [keep(args.out / name, data) for name, data in reports(entries, grades, ids)]
     return 0 if all(written) and not any("failed" in g for g in grades) else 1
 
 
@@ -137,7 +138,7 @@ def say(text: object, where=None) -> None:
         print(text, file=where, flush=True)
 
 
-def keep(path: Path, text: str) -> bool:
+def keep(path: Path, text: str | bytes) -> bool:
     """Write a file; where that fails (a full disk) say so. Returns whether it is there."""
     try:
         write_atomic(path, text)
@@ -404,21 +405,12 @@ def _checks() -> str:
 
 def table(grades: list[dict], ids: list[str]) -> str:
     """The class as CSV, a row a submission."""
-    text = io.StringIO()
-    rows = csv.writer(text, lineterminator="\n")
-    rows.writerow(["submission", "points", "of", *ids, "notes"])
+    rows = []
     for g in grades:
-        points = {e["id"]: f"{e['points']:g}" for e in g["exercises"]}
+        marks = {e["id"]: f"{e['points']:g}" for e in g["exercises"]}
         totals = (f"{g['points']:g}", f"{g['most']:g}")
-        marks = (points[id] for id in ids)
-        rows.writerow([harmless(g["submission"]), *totals, *marks, harmless("; ".join(g["notes"]))])
-    return text.getvalue()
-
-
-def harmless(text: str) -> str:
-    """Text for a spreadsheet, which would take what begins with = + - @ for a formula; some take a
-    semicolon or a line break for the end of a cell."""
-    return re.sub(r"(^|[;,\t\n])(\s*)(?=[=+\-@\uff1d\uff0b\uff0d\uff20])", r"\1\2'", text)
+        rows.append([g["submission"], *totals, *(marks[id] for id in ids), "; ".join(g["notes"])])
+    return sheet(["submission", "points", "of", *ids, "notes"], rows)
 
 
 if __name__ == "__main__":

@@ -6,15 +6,7 @@ from html import escape
 from xml.etree import ElementTree
 
 from tests.grade.judge import Outcome, Result
-
-CSS = """
-body { font: 16px/1.5 system-ui, sans-serif; max-width: 46em; margin: 2em auto; padding: 0 1em;
-  color: #222 }
-h2 { font-size: 1.1em; margin: 1.6em 0 .2em } .points { float: right }
-ul { list-style: none; padding: 0 }
-li { padding: .3em .6em; border-left: 4px solid; margin: .3em 0; background: #f6f6f6 }
-.ok { border-color: #0072b2 } .wrong { border-color: #d55e00 } .hint { display: block; color: #444 }
-"""
+from tests.grade.webpage import webpage
 
 
 def _result(e: dict) -> Result:
@@ -38,12 +30,8 @@ def page(done: dict) -> str:
         parts.append(f"{head}<ul>{''.join(items)}</ul>")
     notes = "".join(f"<p>{escape(note)}</p>" for note in done["notes"])
     name = escape(done["submission"])
-    return (
-        f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{name}</title>'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<style>{CSS}</style><h1>{name}: {done['points']:g} of {done['most']:g} points</h1>"
-        f"{notes}{''.join(parts)}</html>\n"
-    )
+    head = f"<h1>{name}: {done['points']:g} of {done['most']:g} points</h1>"
+    return webpage(done["submission"], f"{head}{notes}{''.join(parts)}")
 
 
 def junit(grades: list[dict]) -> str:
