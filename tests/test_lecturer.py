@@ -5,16 +5,21 @@ import io
 import json
 import math
 import random
+from pathlib import Path
+from zipfile import ZipFile
 
 import numpy as np
 import pytest
 
 from tests.grade import alike, items, trees
+from tests.grade.__main__ import main
 from tests.grade.cell.answer import STUB
 from tests.grade.exercise import find
 from tests.grade.files import RELEASED
+from tests.grade.handed_in import Submission
 from tests.grade.reports import reports
 from tests.grade.sheets import sheet
+from tests.test_grading_files import notebook
 
 E61, E62 = find("6.1"), find("6.2")
 HINT = E61.mistakes[0].hint
@@ -284,5 +289,87 @@ def test_the_page_shows_both_answers_and_says_what_is_wrong_alike():
     assert (table[0]["first"], table[0]["second"], table[0]["same answers"]) == ("s20", "s21", "1")
 
 
+# Gradebooks
+
+
+def entry(*names):
+    return Submission(names[0], tuple((Path("/class") / name, name) for name in names))
+
+
+CANVAS = ["doejane_LATE_4321_98766_06_reward.ipynb", "=evil_77_12_06_reward.ipynb"]
+MOODLE = [
+    "Jo Moe_77_assignsubmission_file_06_reward.ipynb",
+    "Anna-Lena O'Neil_78_assignsubmission_file_",
+    "Participant_79_assignsubmission_file_",
+]
+
+
+def books(names, ids=("6.1", "6.2")):
+    """What the lecturer gets of submissions with these names, file by file. One more has a name of
+    no platform, and one could not be graded."""
+    entries = [entry(name) for name in [*names, "ann", names[-1].replace("7", "8")]]
+    grades = [record(e.name, *(exercise(id, 2) for id in ids)) for e in entries]
+    grades[0]["points"] = 1.5
+    grades[-1]["failed"] = True
+    return dict(reports(entries, grades, list(ids)))
+
+
+def test_canvas_finds_students_by_id_and_their_points_in_the_last_column():
+    """As its importer reads it: five columns on the student, Section the last of them; a row that
+    says what is possible; a row a student."""
+    found = books(CANVAS)
+    head, possible, *students = csv.reader(io.StringIO(found["canvas.csv"]))
+    assert head == ["Student", "ID", "SIS User ID", "SIS Login ID", "Section", "LbW notebook 6"]
+    assert "Points Possible" in possible[0] and possible[1:] == ["", "", "", "", "4"]
+    assert students == [["doejane", "4321", "", "", "", "1.5"], ["'=evil", "77", "", "", "", "4"]]
+    assert "moodle.csv" not in found and "moodle_feedback.zip" not in found
+
+
+def test_several_notebooks_have_one_column():
+    assert "LbW notebooks 5, 6" in books(CANVAS, ("5.1", "5.2", "6.1"))["canvas.csv"]
+
+
+def test_moodle_finds_students_by_identifier():
+    """As its importer reads it: Identifier, "Participant " and a number; Grade; Last modified
+    (grade). A column Feedback comments would erase those that are there."""
+    found = books(MOODLE)
+    table = rows(found["moodle.csv"])
+    assert [row["Identifier"] for row in table] == [f"Participant {n}" for n in (77, 78, 79)]
+    assert [row["Grade"] for row in table] == ["1.5", "4", "4"]
+    assert {row["Last modified (grade)"] for row in table} == {"-"}
+    assert {row["Maximum Grade"] for row in table} == {"4"} and "Feedback comments" not in table[0]
+    assert table[1]["Full name"] == "Anna-Lena O'Neil" and "canvas.csv" not in found
+
+
+def test_moodle_finds_the_feedback_of_each_student_in_the_zip():
+    """As its importer reads a path: name_number_type_plugin_rest, split at the first four _."""
+    names = [*MOODLE, "A_Group-..\\x_80_assignsubmission_file_"]
+    with ZipFile(io.BytesIO(books(names)["moodle_feedback.zip"])) as packed:
+        found = {}
+        for path in packed.namelist():
+            folder, file = path.split("/")
+            _, number, *plugin, rest = folder.split("_", 4)
+            assert plugin == ["assignsubmission", "file"] and (rest, file) == ("", "feedback.html")
+            found[number] = packed.read(path).decode()
+    assert set(found) == {"77", "78", "79", "80"}
+    assert "1.5 of 4 points" in found["77"] and "4 of 4 points" in found["78"]
+
+
+def test_names_that_no_platform_gave_make_no_gradebook():
+    names = {"items.csv", "hints.csv", "items.html", "alike.csv", "alike.html"}
+    assert set(books(["ann.ipynb", "bob_1"])) == names
+
+
+def test_a_download_from_canvas_is_graded_into_its_gradebook(tmp_path):
+    (tmp_path / "class").mkdir()
+    for name, source in (("doejane_4321_98765_06_reward-1", RIGHT), ("roe_7_8_06_reward", ODD)):
+        (tmp_path / "class" / f"{name}.ipynb").write_text(notebook(source))
+    assert main([str(tmp_path / "class"), "--out", str(tmp_path / "out")]) == 0
+    text = (tmp_path / "out" / "canvas.csv").read_text()
+    assert [row["ID"] for row in rows(text)] == ["", "4321", "7"]
+    (item, *_) = rows((tmp_path / "out" / "items.csv").read_text())
+    assert item["submissions"] == "2" and (tmp_path / "out" / "alike.html").exists()
+
+
 def test_one_submission_alone_has_no_statistics():
-    assert list(reports([None], [record("ann", exercise("6.1", 2))], ["6.1"])) == []
+    assert list(reports([entry("ann")], [record("ann", exercise("6.1", 2))], ["6.1"])) == []

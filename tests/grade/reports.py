@@ -4,14 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from tests.grade import alike, items
+from tests.grade import alike, gradebook, items
 from tests.grade.handed_in import Submission
 
 
 def reports(
     entries: list[Submission], grades: list[dict], ids: list[str]
 ) -> Iterator[tuple[str, str | bytes]]:
-    """(name, content) of each; nothing for a single submission. grades: their records."""
+    """(name, content) of each; of a single submission no statistics. grades: their records."""
+    canvas, moodle = gradebook.students(entries, grades)
+    if canvas:
+        yield "canvas.csv", gradebook.canvas_csv(canvas, ids)
+    if moodle:
+        yield "moodle.csv", gradebook.moodle_csv(moodle)
+        yield "moodle_feedback.zip", gradebook.moodle_zip(moodle)
     if len(entries) < 2:
         return
     found = items.statistics(grades, ids)
