@@ -4,7 +4,8 @@
 preprocessors, and the glossary beside it. `python -m solutions archive` writes the kit without the
 solved notebooks to `runs/lbw.zip`, for students. `python -m solutions book` executes the solutions
 and writes them as web pages to `runs/book/`, which need no network: equations are MathML, pictures
-and scenes are in the pages.
+and scenes are in the pages. `python -m solutions gradescope 06` writes what grades a notebook on
+Gradescope to `runs/autograder.zip`.
 """
 
 from __future__ import annotations
@@ -33,12 +34,14 @@ from nbgrader.preprocessors import (
 from traitlets.config import Config
 
 from lbw_minimal.training import InputError, write_atomic
+from tests.grade import gradescope
 from tests.grade.cell.answer import STUB
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
 NOTEBOOKS, GLOSSARY = ROOT / "notebooks", HERE / "GLOSSARY.md"
 BOOK, ARCHIVE = ROOT / "runs" / "book", ROOT / "runs" / "lbw.zip"
+AUTOGRADER = ROOT / "runs" / "autograder.zip"
 TIMEOUT = 1800  # s, for one cell
 # What the kernel does before the first cell, for the figures' alt texts.
 DESCRIBED = (f"import sys; sys.path.insert(0, {str(ROOT)!r})",
@@ -267,16 +270,22 @@ def book(only: list[str]) -> int:
 def main() -> int:
     """Do what is asked; returns the exit code: 1 if a notebook failed, 2 for a mistake."""
     parser = argparse.ArgumentParser(prog="python -m solutions", description=__doc__.split("\n")[0])
-    parser.add_argument("what", choices=["release", "archive", "book"])
-    parser.add_argument("only", nargs="*", help="numbers of the book's notebooks, such as 06")
+    parser.add_argument("what", choices=["release", "archive", "book", "gradescope"])
+    parser.add_argument("only", nargs="*", help="numbers of notebooks, such as 06: to run, or set")
     args = parser.parse_args()
     try:
         if args.what == "book":
             failed = book(args.only)
             print(f"book: {(BOOK / 'index.html').relative_to(ROOT)}")
             return 1 if failed else 0
+        if args.what == "gradescope":
+            if not args.only:
+                raise InputError("say which notebooks are set, as in: gradescope 06")
+            gradescope.archive(AUTOGRADER, ",".join(args.only))
+            print(f"for Gradescope: {AUTOGRADER.relative_to(ROOT)}")
+            return 0
         if args.only:
-            raise InputError(f"{args.what} takes no numbers; only the book does.")
+            raise InputError(f"{args.what} takes no numbers; the book and gradescope do.")
         if args.what == "release":
             release()
         else:

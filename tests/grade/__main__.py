@@ -30,6 +30,7 @@ from lbw_minimal.training import InputError, write_atomic
 from tests.grade import feedback, sandbox
 from tests.grade.exercise import Exercise, everything
 from tests.grade.files import File, in_order, printable
+from tests.grade.gradescope import as_results
 from tests.grade.handed_in import Submission, submissions, wanted
 from tests.grade.judge import UNDONE, Result, best, judge, nothing
 from tests.grade.reports import reports
@@ -48,7 +49,7 @@ def main(argv=None) -> int:
         say(f"error: {sandbox.ELSEWHERE}", sys.stderr)
         return 2
     try:
-        entries = submissions(args.folder, args.out)
+        entries = submissions(args.folder, args.out, args.one)
         ids, chosen = wanted(args.notebooks, entries)
         args.out.mkdir(parents=True, exist_ok=True)
         args.seed = noted_seed(args.out, args.seed)
@@ -108,6 +109,7 @@ def _arguments(argv) -> argparse.Namespace:
         prog="python -m tests.grade", description=__doc__.split("\n")[0]
     )
     parser.add_argument("folder", type=Path, help="submissions: one folder or one notebook each")
+    parser.add_argument("--one", action="store_true", help="the folder is a single submission")
     parser.add_argument("--out", type=Path, default=Path("grades"))
     parser.add_argument(
         "--notebooks",
@@ -324,7 +326,7 @@ def grade_once(
             done["notes"].append(f"its pages could not be written ({e.strerror})")
             say(f"{entry.name}: {done['notes'][-1]}", sys.stderr)
     if gradescope and "failed" not in done:
-        text = json.dumps(feedback.gradescope(done), indent=1) + "\n"
+        text = json.dumps(as_results(done), indent=1) + "\n"
         done |= {} if keep(folder / "results.json", text) else {"failed": True}
     return done
 

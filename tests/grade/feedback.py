@@ -1,4 +1,4 @@
-"""What comes out of grading: the student's page, JUnit XML, and Gradescope's results.json."""
+"""What comes out of grading: the student's page, and the class as JUnit XML."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from tests.grade.judge import Outcome, Result
 from tests.grade.webpage import webpage
 
 
-def _result(e: dict) -> Result:
+def result(e: dict) -> Result:
+    """What a record holds of an exercise."""
     return Result(e["id"], e["title"], [Outcome(**o) for o in e["outcomes"]], e["open"])
 
 
@@ -49,21 +50,5 @@ def junit(grades: list[dict]) -> str:
             if e in failed:
                 mark = f"{e['points']:g} of {e['most']:g}"
                 failure = ElementTree.SubElement(case, "failure", {"message": mark})
-                failure.text = "\n".join(_result(e).lines())
+                failure.text = "\n".join(result(e).lines())
     return ElementTree.tostring(root, encoding="unicode") + "\n"
-
-
-def gradescope(done: dict) -> dict:
-    """Gradescope's results.json."""
-    return {
-        "output": "\n".join(done["notes"]),
-        "tests": [
-            {
-                "name": f"{e['id']} {e['title']}",
-                "score": e["points"],
-                "max_score": e["most"],
-                "output": "\n".join(_result(e).lines()),
-            }
-            for e in done["exercises"]
-        ],
-    }

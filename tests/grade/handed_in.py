@@ -57,15 +57,15 @@ class Submission:
         return files, notes + left_out
 
 
-def submissions(folder: Path, out: Path) -> list[Submission]:
-    """The submissions in a class's folder, or the one that it is, see `is_one`. Raises ValueError
-    where there are none."""
+def submissions(folder: Path, out: Path, one: bool = False) -> list[Submission]:
+    """The submissions in a class's folder, or the one that it is, see `is_one`, or has to be.
+    Raises ValueError where there are none."""
     called = printable(str(folder))
     if not folder.exists():
         raise ValueError(f"{called}: no such folder")
     if not folder.is_dir() and not NOTEBOOK.search(folder.name):
         raise ValueError(f"{called}: neither a folder nor a notebook; unpack an archive first")
-    if not folder.is_dir() or is_one(folder.resolve()):
+    if one or not folder.is_dir() or is_one(folder.resolve()):
         return [Submission.of(folder)]
     students: dict[str, list] = {}
     for path in sorted(folder.iterdir(), key=lambda p: os.fsencode(p.name)):
