@@ -24,6 +24,6 @@ python=$(fitting) || {
 
 cd "$root/source"
 "$python" -m venv "$root/venv"
-pip="$root/venv/bin/python -m pip install --no-cache-dir -c requirements-lock.txt"
-$pip torch --index-url https://download.pytorch.org/whl/cpu
-$pip -r requirements.txt
+# With PyTorch's CPU build, which its own index has.
+"$root/venv/bin/python" -m pip install --no-cache-dir -r requirements.txt -c requirements-lock.txt \
+    --extra-index-url https://download.pytorch.org/whl/cpu
