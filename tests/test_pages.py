@@ -128,7 +128,7 @@ def write_pages(folder):
     ]
     exercise = {"id": "6.1", "title": "Distance", "outcomes": outcomes, "points": 1, "most": 3}
     done = {"submission": "ann", "points": 1, "most": 3, "notes": ["a note"]}
-    exercise["open"] = False
+    exercise["open"], exercise["example"] = False, ""
     (folder / "feedback.html").write_text(feedback(done | {"exercises": [exercise]}))
 
 

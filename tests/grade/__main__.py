@@ -284,8 +284,7 @@ def in_sandbox(exercise: Exercise, given: Answer, over: bool, box: Sandbox, seed
             how["definitions_only"] = True
             failed = start()
         if failed is not None:
-            text = getattr(failed, "text", "")
-            why = f"the cell does not run: {failed}: {text}" if text else f"{failed}"
+            why = f"the cell does not run: {failed.in_full()}" if failed.text else f"{failed}"
             return nothing(exercise, why)
         return judge(exercise, box.call, seed, renew)
     except Lost as e:
@@ -370,8 +369,10 @@ def on_cluster(job, entries: list[Submission], ids: list[str], args) -> list[dic
 def record(entry: Submission, results: list[Result], notes: list[str]) -> dict:
     """What is known of a graded submission, as plain values that can be printed and written."""
     exercises = [asdict(r) | {"points": r.points, "most": r.most} for r in results]
-    for outcome in (o for e in exercises for o in e["outcomes"]):
-        outcome["message"] = printable(outcome["message"])
+    for e in exercises:
+        e["example"] = printable(e["example"])
+        for outcome in e["outcomes"]:
+            outcome["message"] = printable(outcome["message"])
     return {
         "submission": printable(entry.name),
         "notes": [printable(note) for note in notes],

@@ -5,13 +5,14 @@ from __future__ import annotations
 from html import escape
 from xml.etree import ElementTree
 
-from tests.grade.judge import Outcome, Result
+from tests.grade.judge import TRY, Outcome, Result
 from tests.grade.webpage import webpage
 
 
 def result(e: dict) -> Result:
     """What a record holds of an exercise."""
-    return Result(e["id"], e["title"], [Outcome(**o) for o in e["outcomes"]], e["open"])
+    outcomes = [Outcome(**o) for o in e["outcomes"]]
+    return Result(e["id"], e["title"], outcomes, e["open"], e["example"])
 
 
 def page(done: dict) -> str:
@@ -28,7 +29,8 @@ def page(done: dict) -> str:
             items.append(f'<li class="{state}">{mark} {escape(o["label"])}{hint}</li>')
         points = f'<span class="points">{e["points"]:g} / {e["most"]:g}</span>'
         head = f"<h2>{points}{e['id']} {escape(e['title'])}</h2>"
-        parts.append(f"{head}<ul>{''.join(items)}</ul>")
+        paste = f"<p>{TRY}</p><pre>{escape(e['example'])}</pre>" if e["example"] else ""
+        parts.append(f"{head}<ul>{''.join(items)}</ul>{paste}")
     notes = "".join(f"<p>{escape(note)}</p>" for note in done["notes"])
     name = escape(done["submission"])
     head = f"<h1>{name}: {done['points']:g} of {done['most']:g} points</h1>"

@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from tests.grade import example
 from tests.grade.cell.wire import Other, Raised
 from tests.grade.exercise import Check, Exercise, different
 from tests.grade.sandbox import Lost
@@ -20,6 +21,7 @@ from tests.grade.sandbox import Lost
 OPEN = ("NotImplementedError", "StillOpen")  # what an untouched exercise raises
 UNDONE = "not done yet"
 ALONE = threading.RLock()  # torch has one generator of random numbers for all threads
+TRY = "The smallest input that fails, to paste:"
 CHANGES = "it changes its inputs: work on a copy"
 
 
@@ -35,12 +37,14 @@ class Outcome:
 
 @dataclass
 class Result:
-    """What became of an exercise. open: nobody has worked on it yet."""
+    """What became of an exercise. open: nobody has worked on it yet. example: the smallest input
+    that failed, as a call to paste, and what is wrong there; empty if there is none."""
 
     id: str
     title: str
     outcomes: list[Outcome] = field(default_factory=list)
     open: bool = False
+    example: str = ""
 
     @property
     def points(self) -> float:
@@ -58,7 +62,7 @@ class Result:
             said.add(o.message)
             mark = "wrong" if o.message else "ok   "
             lines.append(f"{mark} {o.points:g}/{o.most:g}  {o.label}{note}")
-        return lines
+        return [*lines, TRY, *self.example.splitlines()] if self.example else lines
 
 
 def nothing(exercise: Exercise, message: str, open: bool = False) -> Result:
@@ -119,9 +123,12 @@ def judge(exercise: Exercise, call, seed: int = 0, renew=None) -> Result:
         failed = {a.check.label for a in asked if a.message}
         for o in result.outcomes:
             o.message = hint if o.label in failed else o.message
-    if result.points and not lost and (message := _doubt(asked, call, renew)):
+    doubt = _doubt(asked, call, renew) if result.points and not lost else ""
+    if doubt:
         for o in result.outcomes:
-            o.points, o.message = 0, o.message or message
+            o.points, o.message = 0, o.message or doubt
+    if not (doubt or lost):
+        result.example = _example(exercise, asked, call)
     return result
 
 
@@ -199,6 +206,22 @@ def _hint(exercise: Exercise, asked: list[Asked]) -> str:
     return ""
 
 
+def _example(exercise: Exercise, asked: list[Asked], call) -> str:
+    """The smallest input found that is answered wrongly, as a call to paste, and what is wrong."""
+    wrong = [(a.check, a.question.args) for a in asked if a.message]
+    with ALONE:
+        to_try = example.candidates(wrong) if wrong and example.pasted(exercise) else []
+    try:
+        for check, args in to_try:
+            with ALONE:
+                want, text = example.tried(exercise, args)
+            if text and (said := _message(check, call(args)[0], Question(0, args, want))):
+                return f"{text}\n# {said}"
+    except Lost:
+        pass
+    return ""
+
+
 def _message(check: Check, got, question: Question) -> str:
     if check.verify:
         wrong = check.verify(got, question.args)
@@ -209,7 +232,8 @@ def _message(check: Check, got, question: Question) -> str:
     if type(got) is Raised and got == "ImportError" and "your own lines" in got.text:
         return got.text
     if type(got) is Raised and got == "RuntimeError" and "requires grad" in got.text:
-        return f"it leaves torch, and the gradient ends there: {got.text}"
+        where = f" ({got.line})" if got.line else ""
+        return f"it leaves torch, and the gradient ends there: {got.text}{where}"
     if type(got) is Raised and got == "MemoryError":
         return "it needs more memory than an exercise may take (2 GB)"
     return wrong

@@ -9,8 +9,11 @@ import ast
 import contextlib
 import functools
 import importlib.machinery
+import linecache
+import re
 import signal
 import time
+import traceback
 from types import CodeType
 
 if __package__:
@@ -28,6 +31,8 @@ from torch import nn
 FORBIDDEN = ("lbw_minimal", "tasks", "solutions", "tests")
 DRAWING = ("matplotlib", "IPython")
 STUB = 'raise NotImplementedError("your lines here")'
+# What Python calls the file of an answer: here, in JupyterLab and its kin, in IPython's terminal.
+OWN = re.compile(r"^your cell$|[/\\]ipykernel_\d+[/\\]|^<ipython-input")
 CELL, CELLS = 1.0, 3.0  # s of processor time for a cell beside the answer, and for all of them
 FUTURE = {name: getattr(__future__, name).compiler_flag for name in __future__.all_feature_names}
 
@@ -267,6 +272,8 @@ def define(job: dict) -> Cells:
     exec(compile(PREAMBLE + job["given"], "given", "exec"), names)
     cells = Cells(names, job["definitions_only"])
     cells.others(job["helpers"])
+    lines = job["source"].splitlines(keepends=True)
+    linecache.cache["your cell"] = (len(job["source"]), None, lines, "your cell")
     cells.run(job["source"], label="your cell")
     failed = cells.failed
     if job["name"] not in names and job["below"]:
@@ -291,8 +298,18 @@ def ask(probe, request: bytes, catch=Exception):
     try:
         value = probe(*args)
     except catch as e:
-        return wire.Raised(type(e).__name__, str(e)[:1000]), False, e
+        return raised(e), False, e
     return value, wire.encode(args) != request, None
+
+
+def raised(e: BaseException) -> wire.Raised:
+    """What was raised, and the last line of the student's cells on the way there."""
+    line = ""
+    for frame, number in traceback.walk_tb(e.__traceback__):
+        name = frame.f_code.co_filename
+        if OWN.search(name):
+            line = f"line {number}: {linecache.getline(name, number).strip()}".rstrip(": ")
+    return wire.Raised(type(e).__name__, str(e)[:1000], line[:200])
 
 
 def explained(raised: wire.Raised, e, why: dict) -> wire.Raised:
@@ -303,4 +320,4 @@ def explained(raised: wire.Raised, e, why: dict) -> wire.Raised:
     if isinstance(reason, ImportError):  # what is missing was to be imported
         return wire.Raised(type(reason).__name__, str(reason)[:1000])
     said = f"{type(reason).__name__}: {str(reason)[:200]}"
-    return wire.Raised(raised, f"{raised.text} (the cell had failed: {said})")
+    return wire.Raised(raised, f"{raised.text} (the cell had failed: {said})", raised.line)

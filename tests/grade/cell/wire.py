@@ -23,6 +23,7 @@ DTYPES = {
     for kind, sizes in {"f": (2, 4, 8), "i": (1, 2, 4, 8), "u": (1, 2, 4, 8)}.items()
     for size in sizes
 } | {"b1", "c8", "c16"}
+RAISED = {"raised": 100, "text": 1000, "line": 200}  # characters of each
 KEYS = (str, int, bool, type(None))  # of a dict; numbers of other kinds can share one hash
 
 
@@ -35,12 +36,18 @@ class Other(str):
 
 
 class Raised(str):
-    """What the student's code raised, by the name of its type; `.text` is its message."""
+    """What the student's code raised, by the name of its type; `.text` is its message, and `.line`
+    the line of the student's code that it came from, if it came from one."""
 
-    def __new__(cls, name, text=""):
+    def __new__(cls, name, text="", line=""):
         self = super().__new__(cls, name)
-        self.text = text
+        self.text, self.line = text, line
         return self
+
+    def in_full(self) -> str:
+        """All of it, on one line."""
+        said = f"{self}: {self.text}" if self.text else f"{self}"
+        return f"{said} ({self.line})" if self.line else said
 
 
 def as_numbers(x: np.ndarray) -> np.ndarray:
@@ -76,7 +83,7 @@ def encode(value) -> bytes:
         if isinstance(x, dict):
             return {"dict": [[pack(k, deep + 1), pack(v, deep + 1)] for k, v in dict(x).items()]}
         if kind is Raised:
-            return {"raised": str(x), "text": x.text}
+            return {"raised": str(x), "text": x.text, "line": x.line}
         if kind is Other:
             return {"other": str(x)}
         tensor = kind.__module__.split(".")[0] == "torch" and hasattr(x, "detach")
@@ -133,7 +140,7 @@ def decode(data: bytes, tensor=None):
                 pairs = [(unpack(k, deep + 1), unpack(v, deep + 1)) for k, v in x["dict"]]
                 return {k if type(k) in KEYS else Other(type(k).__name__): v for k, v in pairs}
             if "raised" in x:
-                return Raised(_text(x["raised"], 100), _text(x["text"], 1000))
+                return Raised(*(_text(x[part], most) for part, most in RAISED.items()))
             if "array" in x:
                 sizes = all(type(k) is int and 0 <= k < LARGEST for k in x["shape"])
                 if len(x["shape"]) > 8 or x["array"] not in DTYPES or not sizes:

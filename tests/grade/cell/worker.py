@@ -40,7 +40,7 @@ def run(job: dict, channel) -> None:
         cells = answer.define(job)
         exec(compile(job["probe"], "the check", "exec"), cells.names)
     except BaseException as e:
-        say(wire.Raised(type(e).__name__, str(e)[:1000]))
+        say(answer.raised(e))
         return
     say(None)
     below = job["below"]
