@@ -40,6 +40,7 @@ from tests.grade.cell.answer import STUB
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
 NOTEBOOKS, GLOSSARY = ROOT / "notebooks", HERE / "GLOSSARY.md"
+LECTURER = HERE / "LECTURER.md"  # exam questions with answers
 BOOK, ARCHIVE = ROOT / "runs" / "book", ROOT / "runs" / "lbw.zip"
 AUTOGRADER = ROOT / "runs" / "autograder.zip"
 TIMEOUT = 1800  # s, for one cell
@@ -130,7 +131,8 @@ def release() -> None:
 
 
 def archive(path: Path = ARCHIVE) -> None:
-    """Write the kit's own files but for what `notebooks/` is made of to a zip, in a folder `lbw`.
+    """Write the kit's own files to a zip, in a folder `lbw`, but for what `notebooks/` is made of
+    and what is the lecturer's alone.
 
     Raises InputError if git does not know which files are the kit's.
     """
@@ -145,7 +147,7 @@ def archive(path: Path = ARCHIVE) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     with ZipFile(path, "w", ZIP_DEFLATED) as out:
         for name in filter(None, listed.split("\0")):
-            if ROOT / name not in (*sources(), GLOSSARY):
+            if ROOT / name not in (*sources(), GLOSSARY, LECTURER):
                 out.write(ROOT / name, f"lbw/{name}")
 
 

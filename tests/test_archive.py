@@ -9,7 +9,7 @@ from zipfile import ZipFile
 import nbformat
 import pytest
 
-from solutions.__main__ import ARCHIVE, GLOSSARY, ROOT, archive, main, sources
+from solutions.__main__ import ARCHIVE, GLOSSARY, LECTURER, ROOT, archive, main, sources
 
 MADE = {"tasks/domino.py", "solutions/weights/mytask"}  # by the reader
 OURS = ("lbw_minimal", "notebooks", "solutions", "tasks", "tests")
@@ -43,12 +43,15 @@ def anchors(text):
         yield re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-")
 
 
-def test_what_the_notebooks_are_made_of_and_nothing_else_is_left_out(kit):
+def test_what_the_notebooks_are_made_of_and_the_exam_are_left_out_and_nothing_else(kit):
     said = subprocess.check_output(["git", "ls-files"], cwd=ROOT, text=True).splitlines()
     ours = {name for name in said if (ROOT / name).exists()}
     packed = {p.relative_to(kit).as_posix() for p in kit.rglob("*") if p.is_file()}
-    assert ours - packed == {p.relative_to(ROOT).as_posix() for p in (*sources(), GLOSSARY)}
+    assert ours - packed == {
+        p.relative_to(ROOT).as_posix() for p in (*sources(), GLOSSARY, LECTURER)
+    }
     assert packed <= ours
+    assert not [path for path in kit.rglob("*.md") if "For an exam" in path.read_text("utf-8")]
 
 
 def test_every_link_leads_to_something_in_it(kit):
