@@ -1,7 +1,7 @@
 """Pictures of what the method sees and does, for notebooks and for the page of a run.
 
 In: frames (T, 84, 84, 3) uint8, keypoints z (T, K, 2) in [-1, 1] (x right, y down), logs. Out:
-images, figures, films, and each of them as a data URI. The colours are Okabe and Ito's, which
+images, figures, and each of them as a data URI. The colours are Okabe and Ito's, which
 colour-blind readers can tell apart.
 """
 
@@ -15,7 +15,6 @@ import cv2
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
-from PIL import Image
 
 COLOURS = ("#E69F00", "#0072B2", "#009E73", "#CC79A7", "#D55E00", "#56B4E9", "#F0E442", "#000000")
 STYLE: dict[Any, Any] = {
@@ -197,11 +196,3 @@ def svg(figure: Figure) -> str:
     with rc_context(STYLE):
         figure.savefig(out, format="svg", metadata={"Date": None})
     return data_uri("image/svg+xml", out.getvalue())
-
-
-def film(frames: np.ndarray, fps: float) -> bytes:
-    """Frames (T, H, W, 3) as an animated WebP, which loops and rests at its end."""
-    first, *rest = map(Image.fromarray, frames)
-    out, times = io.BytesIO(), [round(1000 / fps)] * len(rest) + [1000]  # ms
-    first.save(out, "WEBP", save_all=True, append_images=rest, duration=times, loop=0, quality=80)
-    return out.getvalue()

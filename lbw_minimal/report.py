@@ -14,13 +14,13 @@ from typing import Any
 
 import numpy as np
 
+from lbw_minimal.diagram import method as diagram
+from lbw_minimal.films import Film
 from lbw_minimal.pictures import (
     courses,
     curve,
-    data_uri,
     draw_keypoints,
     enlarge,
-    film,
     parts,
     paths,
     picture,
@@ -36,6 +36,7 @@ from lbw_minimal.report_texts import (
     INTRODUCTION,
     LEARNING,
     LEARNT,
+    METHOD,
     PATHS,
     PERCEPTION,
     REPLAY,
@@ -52,7 +53,7 @@ LEARNS = {  # the stages in which something is learnt; the others film
     "avid": ("translation", "classifier", "policy"),
     "classifier": ("classifier", "policy"),
 }
-EPISODE_TITLE, FILM = "What the robot does now", "Film of a test episode"
+EPISODE_TITLE = "What the robot does now"
 MACHINE = (
     "version",
     "machine",
@@ -103,10 +104,12 @@ def write_report(
     form = settings.get("reward", "mended") if method == "lbw" else "classifier"
     kind = "lbw" if method == "lbw" else "rival"
     page = [headline(task, metrics, method)]
+    if translated is not None and z_demo is not None and "frames" in episode:
+        page.append(_method(demo, translated, z_demo, episode))
     columns = demonstration(demo, translated, z_demo, fps, logits)
     page += section(SHOWN[method], DEMONSTRATION[method], columns)
     if "frames" in episode:
-        page += _test_episode(episode, z_demo, metrics.get("episodes", []), fps)
+        page += _test_episode(demo, translated, z_demo, episode, metrics.get("episodes", []), fps)
     if scene_html:
         frame = f'<iframe title="The episode in 3-D" srcdoc="{escape(scene_html)}"></iframe>'
         page += section("The same episode in three dimensions", SCENE, frame, kind="scene")
@@ -124,22 +127,38 @@ def write_report(
     write_atomic(path, HTML.format(title=title, css=CSS, body="".join(page)))
 
 
-def _test_episode(episode, z_demo, episodes, fps):
+def _keypoints(episode, K):
+    """z (T, K, 2) of a test episode, of its observations."""
+    seen = np.asarray(episode["z"], float).reshape(len(episode["frames"]), -1)
+    return seen[:, : 2 * K].reshape(-1, K, 2)
+
+
+def _method(demo, translated, z_demo, episode):
+    """The method in frames of this run: the middle of the video and of the test episode."""
+    i, j = len(demo) // 2, len(episode["frames"]) // 2
+    z = _keypoints(episode, z_demo.shape[1])[j]
+    figure = diagram(demo[i], translated[i], z_demo[i], episode["frames"][j], z)
+    return picture(svg(figure), METHOD)
+
+
+def _test_episode(demo, translated, z_demo, episode, episodes, fps):
     """The film of a test episode, how all of them ended, and its keypoints beside the video's."""
     frames = episode["frames"]
     marks = " ".join("✓" if row["success"] else "✗" for row in episodes)
     marks = f'<p class="small">All test episodes, this one first: {marks}</p>' if marks else ""
     if z_demo is None:
-        shown = picture(data_uri("image/webp", film(enlarge(frames, 4), fps / 2)), FILM)
+        shown = Film({"the robot, in a test episode": frames}, fps / 2).html()
         return section(EPISODE_TITLE, EPISODE["rival"], shown, marks)
-    K = z_demo.shape[1]
-    z = np.asarray(episode["z"], float).reshape(len(frames), -1)[:, : 2 * K].reshape(-1, K, 2)
-    shown = picture(data_uri("image/webp", film(draw_keypoints(frames, z), fps / 2)), FILM)
+    z = _keypoints(episode, z_demo.shape[1])
+    films = {"the human": demo}
+    if translated is not None:
+        films["its translation"] = draw_keypoints(translated, z_demo, 3)
+    films["the robot, in a test episode"] = draw_keypoints(frames, z, 3)
     pair = picture(svg(paths(z_demo, z, frames[-1])), "Paths of the keypoints in the image")
     pair += picture(svg(courses(z_demo, z)), "Coordinates of the keypoints over time")
     beside = f'<div class="row">{pair}</div>'
     return [
-        *section(EPISODE_TITLE, EPISODE["lbw"], shown, marks),
+        *section(EPISODE_TITLE, EPISODE["lbw"], Film(films, fps / 2).html(), marks),
         *section("Does it follow the demonstration?", PATHS, beside),
     ]
 

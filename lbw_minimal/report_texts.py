@@ -88,6 +88,12 @@ task already.</p>
 """,
 }
 
+METHOD = (
+    "The method in frames of this run. A frame of the human video is translated, and keypoints are "
+    "found on it. The robot's own keypoints give the policy's action; compared with the video's "
+    "they give the reward, from which SAC learns."
+)
+
 VIDEOS = {  # what each method learns from
     "lbw": "one video",
     "avid": "15 videos of a human",
@@ -119,8 +125,9 @@ moment for an end (a logit: above 0 it says yes).</p>
 
 EPISODE = {
     "lbw": """
-<p>The first test episode at half speed, as the robot's camera sees it. The numbered dots are the
-keypoints it steers by: all it knows of the scene.</p>
+<p>The first test episode beside the video, both from their first frame on and at half speed. The
+dots are the keypoints it steers by: all it knows of the scene. It need not keep the human's pace:
+a long video is sped up, and a fast one slowed down.</p>
 """,
     "rival": """
 <p>The first test episode at half speed, as the robot's camera sees it. It knows the last three of

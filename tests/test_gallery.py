@@ -3,6 +3,7 @@
 import re
 
 import cv2
+from PIL import Image
 
 import tasks
 from tasks.commands import gallery, own_arm
@@ -18,7 +19,8 @@ def test_the_page_shows_a_task_with_its_two_scenes(tmp_path, monkeypatch):
     for name in scenes:
         scene = (tmp_path / name).read_text()
         assert "MeshCat.Viewer" in scene and len(scene) < 2e6
-    assert page.count("<figure>") == 8 + 3  # frames of the demonstration, two scenes and a film
+    assert page.count("<figure>") == 8 + 2  # frames of the demonstration, two scenes
+    assert page.count("<video") == 1
     assert page.count('<img class="still" alt="reach, ') == 2  # what is printed of the scenes
     assert str(tmp_path) not in page and str(tasks.ROOT) not in page
     assert not re.search(r'(?:src|href)="(?!data:|reach-)', page)
@@ -42,3 +44,15 @@ def test_the_readmes_picture_is_of_the_same_kind_and_says_so():
     assert "look-alike" in alt and "simulator" in alt
     picture = cv2.imread(str(tasks.WEIGHTS / "eyes" / "lookalike.png"))
     assert picture.shape[1] == 6 * 168 and picture.std() > 20
+
+
+def test_the_readmes_film_is_small_moves_and_is_still_where_that_is_asked_for():
+    text = (tasks.ROOT / "README.md").read_text(encoding="utf-8")
+    film = tasks.ROOT / "solutions" / "results" / "push.webp"
+    alt, name = re.search(r'<img alt="([^"]+)" src="([^"]+\.webp)"', text).groups()
+    assert (tasks.ROOT / name) == film and len(alt) > 50
+    assert film.stat().st_size < 400_000
+    with Image.open(film) as frames:
+        assert frames.n_frames > 30 and frames.size == (768, 252)
+    (still,) = re.findall(r'prefers-reduced-motion: reduce\)" srcset="([^"]+)"', text)
+    assert (tasks.ROOT / still).exists()

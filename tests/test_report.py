@@ -135,17 +135,12 @@ def test_down_is_down_in_the_plots_of_keypoints():
         assert top < bottom
 
 
-def test_the_film_keeps_every_frame_and_loops():
-    frames = np.random.default_rng(0).integers(0, 256, (5, 84, 84, 3), np.uint8)
-    with Image.open(io.BytesIO(pictures.film(frames, 12.5))) as film:
-        assert (film.n_frames, film.info["loop"], film.size) == (5, 0, (84, 84))
-        film.load()
-        assert film.info["duration"] == 80  # ms
-
-
 def test_the_page_has_every_section(page):
     assert len(titles(page)) == 10
-    assert page.count("<img") == 8 + 1 + 2 + 1 + 1  # columns, film, paths, curve, reward
+    assert (
+        page.count("<img") == 1 + 8 + 1 + 2 + 1 + 1
+    )  # method, columns, film, paths, curve, reward
+    assert page.count("<video") == 1
     for text in ("9 of 10", "60-98 %", "11.0 min", "0.987 (0.4)", "python -m tasks push --seed 7",
                  "two cores", "keypoint std", "0.25, 0.11", "recipe K", "✓ ✓ ✓ ✗ ✓"):  # fmt: skip
         assert text in page

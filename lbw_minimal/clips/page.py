@@ -18,13 +18,12 @@ from matplotlib.figure import Figure
 
 from lbw_minimal.clips.paths import SURE, Tracks
 from lbw_minimal.clips.retarget import FPS, Motion, Scene
+from lbw_minimal.films import Film
 from lbw_minimal.pictures import (
     COLOURS,
     STYLE,
     data_uri,
     draw_keypoints,
-    enlarge,
-    film,
     picture,
     spread,
     svg,
@@ -115,9 +114,14 @@ def write_page(
     page += [f'<p class="note">{escape(warning)}</p>' for warning in warnings]
     if columns and shown is not None:
         seen = _clip_column(frames, times, tracks, motion, shown)
-        shot = data_uri("image/webp", film(_side_by_side(seen, *columns), _rate(shown) / 2))
-        page += section("Clip, re-enactment, translation, keypoints", SIDE_BY_SIDE,
-                        picture(shot, "Film of the clip and what became of it"))  # fmt: skip
+        done, translated, z = columns
+        films = {"the clip": seen, "done again": done, "its translation": translated,
+                 "its keypoints": draw_keypoints(translated, z, SCALE)}  # fmt: skip
+        page += section(
+            "Clip, re-enactment, translation, keypoints",
+            SIDE_BY_SIDE,
+            Film(films, _rate(shown) / 2).html(),
+        )
     if tracks is not None:
         page += section("What was found in the clip", CLICK, clip_frames(frames, times, tracks),
                         SCRIPT % json.dumps(command).replace("<", "\\u003c"))  # fmt: skip
@@ -190,15 +194,6 @@ def _clip_column(frames, times, tracks, motion, shown):
         square[top : top + small.shape[0], left : left + small.shape[1]] = small
         out.append(square)
     return np.stack(out)
-
-
-def _side_by_side(seen, done, translated, z):
-    parts = (
-        seen,
-        *(enlarge(x, SCALE) for x in (done, translated)),
-        draw_keypoints(translated, z, SCALE),
-    )
-    return np.concatenate(parts, axis=2)
 
 
 def _rate(shown):

@@ -12,7 +12,7 @@ from matplotlib import rc_context
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from lbw_minimal.pictures import COLOURS, STYLE, draw_keypoints, enlarge, spread
+from lbw_minimal.pictures import COLOURS, STYLE, spread
 from lbw_minimal.report import wilson
 
 LINES = ("-", "--", "-.", ":")
@@ -49,48 +49,6 @@ def strips(rows: Mapping[str, np.ndarray], n: int = 6) -> Figure:
             for axis, frame in zip(line, frames[i], strict=True):
                 _show(axis, frame)
             line[0].set_ylabel(name, fontsize=9)
-    return figure
-
-
-def method(
-    human: np.ndarray, translated: np.ndarray, z_E: np.ndarray, robot: np.ndarray, z: np.ndarray
-) -> Figure:
-    """The paper's Figure 2 from real frames (84, 84, 3) and their keypoints (K, 2).
-
-    Above, the human video on its way to a keypoint trajectory; below, the robot's observation on
-    its way to an action; between them the reward.
-    """
-    detected = draw_keypoints(np.stack([translated, robot]), np.stack([z_E, z]), 4)
-    upper = [(enlarge(human[None], 4)[0], "human video $x_i^E$"),
-             (enlarge(translated[None], 4)[0], "translated $v_i^E$"),
-             (detected[0], "its keypoints $z_i^E$")]  # fmt: skip
-    lower = [(enlarge(robot[None], 4)[0], "robot's view $O_t$"),
-             (detected[1], "its keypoints $z_t$")]  # fmt: skip
-    with rc_context(STYLE | {"figure.constrained_layout.use": False}):
-        figure = Figure(figsize=(9.2, 4.4))
-        page = figure.add_axes((0, 0, 1, 1))
-        page.set(xlim=(0, 9.2), ylim=(0, 4.4))
-        page.axis("off")
-        for x, y, (image, title) in zip(
-            (0.2, 2.7, 5.2, 0.2, 2.7), (2.45, 2.45, 2.45, 0.15, 0.15), upper + lower, strict=True
-        ):
-            page.imshow(image, extent=(x, x + 1.6, y, y + 1.6), aspect="equal")
-            page.text(x + 0.8, y + 1.68, title, ha="center", fontsize=9)
-        for (x, y), (u, v), name in (
-            ((1.85, 3.25), (2.65, 3.25), "MUNIT\nEq. 1-5"),
-            ((4.35, 3.25), (5.15, 3.25), "Transporter\nEq. 6-7"),
-            ((1.85, 0.95), (2.65, 0.95), "Transporter"),
-            ((4.35, 0.95), (7.25, 0.95), "policy $\\pi(z_t)$"),
-            ((6.85, 3.25), (7.55, 2.55), ""),
-            ((4.35, 1.35), (7.25, 2.05), ""),
-        ):
-            page.annotate("", (u, v), (x, y), arrowprops={"arrowstyle": "-|>", "lw": 1.4})
-            page.text((x + u) / 2, (y + v) / 2 + 0.09, name, ha="center", va="bottom", fontsize=8)
-        box = {"boxstyle": "round", "facecolor": "#f2f4f7", "edgecolor": "#888888"}
-        page.text(8.1, 2.3, "reward $r_t$\nEq. 8-10", ha="center", va="center", bbox=box)
-        page.text(8.1, 0.95, "action $a_t$\nby SAC", ha="center", va="center", bbox=box)
-        page.annotate("", (8.1, 1.3), (8.1, 1.95), arrowprops={"arrowstyle": "-|>", "lw": 1.4})
-        page.set(xlim=(0, 9.2), ylim=(0, 4.4))  # imshow changed them
     return figure
 
 

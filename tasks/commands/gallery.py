@@ -3,7 +3,7 @@ and, below them, what becomes of a clip of one's own.
 
 In: the human videos and the trained weights that come with the kit. Out: `index.html` with the
 pictures in it, and beside it a scene for every task and arm that turns with the mouse, each a file
-of its own.
+of its own, and every task's film as a WebP, for slides and READMEs.
 """
 
 from __future__ import annotations
@@ -17,8 +17,9 @@ import numpy as np
 
 import tasks
 from lbw_minimal import sac, video
+from lbw_minimal.films import Film
 from lbw_minimal.imitate import watched
-from lbw_minimal.pictures import data_uri, draw_keypoints, film, picture
+from lbw_minimal.pictures import data_uri, draw_keypoints
 from lbw_minimal.report import demonstration
 from lbw_minimal.report_texts import CSS
 from lbw_minimal.training import write_atomic
@@ -29,12 +30,12 @@ from tasks.world.scene import FPS
 from tasks.world.viewer import mirror
 
 SEED = 0  # of the rollout that is shown: no start jitter, as in the video
-TRIO = """
-.trio { display: grid; grid-template-columns: repeat(3, 1fr); gap: .5rem }
-.trio figure { margin: 0 }
-.trio img, .trio iframe { width: 100%; height: 17rem; object-fit: cover }
-@media (max-width: 40rem) { .trio { grid-template-columns: 1fr } }
-@media print { .trio { grid-template-columns: repeat(3, 1fr) } .trio img { height: 7rem } }
+PAIR = """
+.pair { display: grid; grid-template-columns: repeat(2, 1fr); gap: .5rem }
+.pair figure { margin: 0 }
+.pair iframe, .pair img { width: 100%; height: 17rem; object-fit: cover }
+@media (max-width: 40rem) { .pair { grid-template-columns: 1fr } }
+@media print { .pair { grid-template-columns: repeat(2, 1fr) } .pair img { height: 9rem } }
 """
 HEAD = """<!DOCTYPE html>
 <html lang="en">
@@ -47,8 +48,9 @@ HEAD = """<!DOCTYPE html>
 <body>
 <h1>The five tasks</h1>
 <p>Above in each row of pictures: frames of the one human video the robot learns from. Below: the
-same frames translated into the robot's world, with the keypoints found on them. Then both arms in
-scenes that turn with the mouse, and the robot's own view of what it learnt.</p>
+same frames translated into the robot's world, with the keypoints found on them. Then, at half
+speed, the whole video beside what the robot learnt from it, and both arms in scenes that turn with
+the mouse.</p>
 """
 
 
@@ -69,7 +71,7 @@ def main(argv: list[str]) -> None:
 def write(out: Path) -> Path:
     """Write the gallery into the folder `out` and return its page."""
     make_folder(out)
-    page = [HEAD.format(css=CSS + TRIO)]
+    page = [HEAD.format(css=CSS + PAIR)]
     for name in tasks.TASKS:
         page.append(section(name, out))
         print(f"{name}: done", flush=True)
@@ -90,19 +92,25 @@ def section(name: str, out: Path) -> str:
     shows = perform(human, out / f"{name}-human.html", "The human, who shows it").picture()
     human.close()
 
-    shown = data_uri("image/webp", film(draw_keypoints(frames, z), FPS / 2))
-    result = "what it sees at half speed: it " + ("succeeds" if won else "fails")
-    trio = [
+    films = Film(
+        {"the human": demo,
+         "its translation": draw_keypoints(perception.translated, perception.z_E, 3),
+         "the robot, which " + ("succeeds" if won else "fails"): draw_keypoints(frames, z, 3)},
+        FPS / 2,
+    )  # fmt: skip
+    write_atomic(out / f"{name}.webp", films.webp())
+    pair = [
         (scene(name, "human", shows), "the human, who shows it"),
         (scene(name, "robot", robots), "the robot, as it learnt it"),
-        (picture(shown, f"The robot does it: {name}"), result),
     ]
     cells = "".join(
-        f"<figure>{x}<figcaption>{caption}</figcaption></figure>" for x, caption in trio
+        f"<figure>{x}<figcaption>{caption}</figcaption></figure>" for x, caption in pair
     )
     columns = demonstration(demo, perception.translated, perception.z_E, FPS)
     title = escape(tasks.sentence(name))
-    return f'<section><h2>{title}</h2>{columns}<div class="trio">{cells}</div></section>'
+    return (
+        f'<section><h2>{title}</h2>{columns}{films.html()}<div class="pair">{cells}</div></section>'
+    )
 
 
 def scene(name: str, arm: str, png: bytes) -> str:

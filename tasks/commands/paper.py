@@ -17,7 +17,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import tasks
-from lbw_minimal import video
+from lbw_minimal import diagram, video
 from lbw_minimal.pictures import data_uri
 from lbw_minimal.report_texts import CSS, HTML
 from lbw_minimal.training import write_atomic
@@ -203,7 +203,7 @@ def method(plan: Plan) -> str:
     perception, demo, robot = translations.munit(plan.runs), demo_of("push"), robot_of("push")
     i, j = len(demo) // 2, len(robot) // 2
     z = perception.detect(robot[j : j + 1])[0]
-    figure = figures.method(demo[i], perception.translated[i], perception.z_E[i], robot[j], z)
+    figure = diagram.method(demo[i], perception.translated[i], perception.z_E[i], robot[j], z)
     return shown(plan, "method", figure, "Human video to keypoints to reward and action")
 
 
