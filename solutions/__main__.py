@@ -184,6 +184,7 @@ def opening(source: Path) -> tuple[str, str]:
 def page(notebook: nbformat.NotebookNode, source: Path) -> str:
     """An executed notebook as a web page that needs nothing else, with links to its neighbours."""
     equations = []
+    notebook.metadata.pop("widgets", None)  # no kernel would answer them
 
     def keep(found):  # the exporter would take MathML apart
         if found[1]:
