@@ -87,6 +87,7 @@ def write_report(
     metrics: dict | None = None,
     scene_html: str | None = None,
     command: str | None = None,
+    links: str = "",
     fps: float = 25,
 ) -> None:
     """Write the page of a run, whole or not at all; what is None or empty is left out.
@@ -97,6 +98,7 @@ def write_report(
     "z" (T, K, 2) (or observations whose first 2K numbers are z), and "parts", a dict of reward
     parts per step. metrics: as in metrics.json: "success", "episodes", "stages" in s, "perception",
     "settings", "machine". scene_html: a page of its own. command: what makes this run again.
+    links: HTML that leads to other pages.
     """
     metrics, episode = metrics or {}, episode or {}
     settings = metrics.get("settings", {})
@@ -124,7 +126,7 @@ def write_report(
     if command:
         page += section("To make this run again", f"<pre>{escape(command)}</pre>")
     title = f"{escape(task)}: learning by watching"
-    write_atomic(path, HTML.format(title=title, css=CSS, body="".join(page)))
+    write_atomic(path, HTML.format(title=title, css=CSS, links=links, body="".join(page)))
 
 
 def _keypoints(episode, K):

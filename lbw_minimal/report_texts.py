@@ -6,32 +6,40 @@ Texts that depend on the method have its name as a key; where both rivals share 
 from __future__ import annotations
 
 CSS = """
-:root { color-scheme: light }
+:root { color-scheme: light; --page: #fff; --ink: #1b1b1b; --soft: #555; --panel: #f2f4f7;
+        --line: #ddd; --note: #fff3d6; --link: #0b57d0 }
+@media screen and (prefers-color-scheme: dark) {
+  :root { color-scheme: dark; --page: #16181c; --ink: #e8e8e8; --soft: #b4b9c1; --panel: #252930;
+          --line: #454b55; --note: #3f3214; --link: #8ab4f8 }
+}
 * { box-sizing: border-box }
-body { margin: 0 auto; max-width: 56rem; padding: 1rem 1rem 4rem; background: #fff; color: #1b1b1b;
-       font: 1rem/1.55 system-ui, sans-serif }
+body { margin: 0 auto; max-width: 56rem; padding: 1rem 1rem 4rem; background: var(--page);
+       color: var(--ink); font: 1rem/1.55 system-ui, sans-serif }
+a { color: var(--link) }
+nav { display: flex; flex-wrap: wrap; gap: .2rem 1.2rem; font-size: .85rem; color: var(--soft) }
 h1 { font-size: 1.9rem; line-height: 1.2; margin: 1rem 0 .5rem }
-h2 { font-size: 1.25rem; margin: 2.6rem 0 .4rem; border-top: 1px solid #ddd; padding-top: 1.2rem }
+h2 { font-size: 1.25rem; margin: 2.6rem 0 .4rem; padding-top: 1.2rem;
+     border-top: 1px solid var(--line) }
 p, ol { max-width: 44rem; margin: .5rem 0 }
 img, iframe { max-width: 100%; border: 0; display: block }
 iframe { width: 100%; height: min(26rem, 65vh) }
 .tiles, .row { display: flex; flex-wrap: wrap; gap: .75rem; margin: 1rem 0 }
-.tiles div { flex: 1 1 8rem; background: #f2f4f7; border-radius: 8px; padding: .6rem .9rem }
+.tiles div { flex: 1 1 8rem; background: var(--panel); border-radius: 8px; padding: .6rem .9rem }
 .tiles b { display: block; font-size: 1.35rem }
-.tiles span, figcaption, .small { color: #555; font-size: .85rem }
+.tiles span, figcaption, .small { color: var(--soft); font-size: .85rem }
 .row > img { flex: 1 1 20rem; min-width: 0 }
 .strip { display: grid; grid-template-columns: repeat(8, 1fr); gap: .5rem .3rem; margin: 1rem 0 }
 @media (max-width: 40rem) { .strip { grid-template-columns: repeat(4, 1fr) } }
 .strip figure { margin: 0; text-align: center }
 .strip img { width: 100% }
-.note { background: #fff3d6; border-left: 4px solid #E69F00; padding: .5rem .9rem }
+.note { background: var(--note); border-left: 4px solid #E69F00; padding: .5rem .9rem }
 table { border-collapse: collapse; margin: .8rem 0; font-size: .92rem; display: block;
         overflow-x: auto }
-th, td { text-align: left; padding: .25rem 1.1rem .25rem 0; border-bottom: 1px solid #e4e4e4 }
-pre { white-space: pre-wrap; background: #f2f4f7; border-radius: 8px; padding: .7rem .9rem;
+th, td { text-align: left; padding: .25rem 1.1rem .25rem 0; border-bottom: 1px solid var(--line) }
+pre { white-space: pre-wrap; background: var(--panel); border-radius: 8px; padding: .7rem .9rem;
       overflow-x: auto }
 .still { display: none }
-@media print { .scene, iframe { display: none } .still { display: block }
+@media print { nav, .scene, iframe { display: none } .still { display: block }
                h1, h2, h2 + p { break-after: avoid } h2, figure, img, tr { break-inside: avoid } }
 """
 
@@ -44,7 +52,9 @@ HTML = """<!DOCTYPE html>
 <style>{css}</style>
 </head>
 <body>
+{links}<main>
 {body}
+</main>
 </body>
 </html>
 """

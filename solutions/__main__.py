@@ -33,7 +33,9 @@ from nbgrader.preprocessors import (
 )
 from traitlets.config import Config
 
+from lbw_minimal.report_texts import CSS, HTML
 from lbw_minimal.training import InputError, write_atomic
+from tasks.commands.links import links
 from tests.grade import gradescope
 from tests.grade.cell.answer import STUB
 
@@ -50,8 +52,8 @@ DESCRIBED = (f"import sys; sys.path.insert(0, {str(ROOT)!r})",
 STYLE = """
 body { margin: 0 auto !important; max-width: 62rem; padding: 0 1rem 4rem }
 nav { position: sticky; top: 0; z-index: 9; display: flex; gap: 1.5rem; padding: .6rem 1rem;
-  background: #fff; border-bottom: 1px solid #ddd; font: 15px system-ui, sans-serif;
-  flex-wrap: wrap }
+  background: var(--jp-layout-color0); border-bottom: 1px solid var(--jp-border-color2);
+  font: 15px system-ui, sans-serif; flex-wrap: wrap }
 nav label { margin-left: auto }
 body:has(#plain:checked) .jp-InputArea:has(.jp-CodeMirrorEditor) { display: none }
 body:has(#plain:checked) .jp-InputPrompt { visibility: hidden }
@@ -63,25 +65,34 @@ img { max-width: 100% }
   pre { white-space: pre-wrap !important; overflow-wrap: anywhere }
 }
 .jp-InputPrompt, .jp-OutputPrompt { opacity: 1 !important }
-details { border-left: 3px solid #ddd; padding-left: .8rem; margin: .6rem 0 }
-summary { cursor: pointer; color: #444 }
+details { border-left: 3px solid var(--jp-border-color2); padding-left: .8rem; margin: .6rem 0 }
+summary { cursor: pointer; color: var(--jp-ui-font-color1) }
 /* nbconvert's colours, dark enough for small type on grey: 4.5 to 1 and more */
-.highlight .o, .highlight .ow { color: #8414c8 !important }
-.highlight .c1 { color: #356e6e !important }
-.highlight .mi, .highlight .mf { color: #007000 !important }
+@media not screen, not (prefers-color-scheme: dark) {
+  .highlight .o, .highlight .ow { color: #8414c8 !important }
+  .highlight .c1 { color: #356e6e !important }
+  .highlight .mi, .highlight .mf { color: #007000 !important }
+}
 @media print {
   nav, iframe { display: none !important }
   /* What is folded is open on paper, where nobody can unfold it. */
   details::details-content { content-visibility: visible !important; block-size: auto !important }
   .jp-InputArea-editor, .jp-OutputArea-output { overflow: visible !important }
   figure, img, tr { break-inside: avoid }
+  math[display=block] { font-size: .78em }
   h1, h2, h3 { break-after: avoid }
 }
 """
+DARK = """
+:root { color-scheme: dark }
+body { background: var(--jp-layout-color0) }
+.highlight .o, .highlight .ow { color: #d0a6ff !important }
+.highlight .c1 { color: #9cc4c4 !important }
+.highlight .mi, .highlight .mf { color: #8ce08c !important }
+"""
 INDEX = """
-body { font: 17px/1.5 system-ui, sans-serif; max-width: 46rem; margin: 3rem auto;
-  padding: 0 1rem; color: #222 }
-li { margin: .7rem 0; list-style: none } ul { padding: 0 } a { color: #0072b2; font-weight: 600 }
+body { font-size: 1.05rem; max-width: 46rem }
+li { margin: .7rem 0; list-style: none } ul { padding: 0 } li a { font-weight: 600 }
 p { margin: .1rem 0 }
 """
 LINK = re.compile(r"\]\((\d\d_\w+)\.ipynb")
@@ -222,8 +233,16 @@ def page(notebook: nbformat.NotebookNode, source: Path) -> str:
             links.append(f'<a href="{near.stem}.html">{opening(near)[0]}</a>')
     switch = '<label><input type="checkbox" id="plain"> hide the code</label>'
     bar = f"<nav>{''.join(links)}{switch}</nav>"
-    html = html.replace("</head>", f"<style>{STYLE}</style></head>", 1)
+    html = html.replace("</head>", f"<style>{STYLE}{dark(exporter)}</style></head>", 1)
     return re.sub(r"(<body[^>]*>)", lambda found: found[1] + bar, html, count=1)
+
+
+def dark(exporter: HTMLExporter) -> str:
+    """nbconvert's dark colours, for readers whose system asks for them, on a screen."""
+    folders = map(Path, exporter.template_paths)
+    (theme,) = {f for p in folders for f in [p / "static" / "theme-dark.css"] if f.exists()}
+    colours = theme.read_text(encoding="utf-8")
+    return f"@media screen and (prefers-color-scheme: dark) {{ {colours} {DARK} }}"
 
 
 def glossary() -> str:
@@ -242,11 +261,11 @@ def contents() -> str:
         rows.append(f'<li><a href="{source.stem}.html">{title}</a><p>{question}</p></li>')
     rows.append('<li><a href="glossary.html">Words of the field</a></li>')
     title = "LbW minimal, the course"
-    return (
-        f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{title}</title>'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">'
-        f"<style>{INDEX}</style><h1>{title}</h1><ul>{''.join(rows)}</ul></html>\n"
+    body, others = (
+        f"<h1>{title}</h1><ul>{''.join(rows)}</ul>",
+        links(BOOK / "index.html", BOOK.parent),
     )
+    return HTML.format(title=title, css=CSS + INDEX, links=others, body=body)
 
 
 def book(only: list[str]) -> int:

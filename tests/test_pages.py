@@ -13,6 +13,7 @@ import tests.test_report as a_run
 from lbw_minimal import report
 from solutions import __main__ as course
 from solutions.alt import words
+from tasks.commands import links
 from tests import browser
 from tests.grade.feedback import page as feedback
 
@@ -61,6 +62,12 @@ AUDIT = """
 """.replace("LEAST", str(LEAST))
 FINE = {"faint": [], "cut": [], "no alt": 0, "no title": 0, "too wide": 0}
 FINE |= {"no viewport": 0, "no language": 0}
+# Where a screen reader may jump to, and how light the page is, from 0 to 1.
+PLACES = """
+({main: document.querySelectorAll("main").length, nav: document.querySelectorAll("nav").length,
+  light: getComputedStyle(document.body).backgroundColor.match(/[\\d.]+/g)
+    .slice(0, 3).reduce((sum, v) => sum + v / 765, 0)})
+"""
 # Blocks whose content does not fit on the paper, whether a scene or its picture is printed, and
 # what is folded there, where nobody can unfold it.
 PAPER = """
@@ -73,7 +80,7 @@ PAPER = """
     folds: folds.length,
     folded: folds.filter(e => !e.lastElementChild.checkVisibility()).length,
     cut: far.map(e => e.tagName + "." + e.className),
-    scenes: shown.filter(e => e.tagName === "IFRAME").length,
+    scenes: shown.filter(e => ["IFRAME", "VIDEO"].includes(e.tagName)).length,
     stills: shown.filter(e => e.className === "still" && e.clientHeight > 50).length,
   };
 })()
@@ -112,7 +119,8 @@ BAD = """<!doctype html><p style="opacity: 0.5; color: #616161">faint</p>
 <img src="data:,"><iframe></iframe><div style="width: 3000px">wide</div>
 <div class="x" style="overflow: hidden; width: 9px">clipped</div>
 <details><summary>folded</summary><p>hidden</p></details>"""
-NAMES = ["book.html", "contents.html", "glossary.html", "report.html", "feedback.html"]
+OURS = ["book.html", "contents.html", "glossary.html", "report.html"]
+NAMES = [*OURS, "feedback.html"]
 
 
 def write_pages(folder):
@@ -121,7 +129,8 @@ def write_pages(folder):
     (folder / "book.html").write_text(book_page())
     (folder / "contents.html").write_text(course.contents())
     (folder / "glossary.html").write_text(course.glossary())
-    report.write_report(folder / "report.html", **a_run.example())
+    others = links.links(folder / "report.html")
+    report.write_report(folder / "report.html", **a_run.example(), links=others)
     outcomes = [
         {"label": "the value", "points": 0, "most": 2, "message": "the sign is wrong"},
         {"label": "the shape", "points": 1, "most": 1, "message": None},
@@ -133,8 +142,8 @@ def write_pages(folder):
 
 
 async def look(folder):
-    """What is seen of each page: name -> (on a wide screen, on a phone, on paper)."""
-    seen = {}
+    """What is seen of each page: name -> (on a wide screen, on a phone, on paper, in the dark)."""
+    seen, night = {}, [{"name": "prefers-color-scheme", "value": "dark"}]
     # Without --hide-scrollbars a desktop's bar would take 15 pixels from the page.
     async with browser.opened(folder / "bad.html", folder / "profile", "--hide-scrollbars") as page:
         for name in ("bad.html", *NAMES):
@@ -149,6 +158,11 @@ async def look(folder):
                 await page.call("Emulation.setDeviceMetricsOverride", mobile=width == PHONE, **size)
                 await page.call("Emulation.setEmulatedMedia", media=media)
                 seen[name].append(await page.js(code))
+            size["width"] = WIDE
+            await page.call("Emulation.setDeviceMetricsOverride", mobile=False, **size)
+            await page.call("Emulation.setEmulatedMedia", media="screen", features=night)
+            seen[name].append(await page.js(AUDIT) | await page.js(PLACES))
+            await page.call("Emulation.setEmulatedMedia", media="screen", features=[])
     return seen
 
 
@@ -164,24 +178,44 @@ def seen(tmp_path_factory):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_page_can_be_read_on_a_screen_and_on_a_phone(seen, name):
-    wide, phone, _ = seen[name]
+    wide, phone, *_ = seen[name]
     assert wide == FINE and phone == FINE
+
+
+@pytest.mark.parametrize("name", OURS)
+def test_a_page_is_dark_where_that_is_asked_for_can_be_read_so_and_has_landmarks(seen, name):
+    dark = seen[name][3]
+    assert {key: dark[key] for key in FINE} == FINE
+    assert dark["light"] < 0.2 and dark["main"] == 1 and dark["nav"] == 1
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_page_is_whole_on_paper(seen, name):
-    """A scene, which would be blank there, is a picture."""
+    """A scene or a film, which would be blank there, is a picture."""
     paper = seen[name][2]
     assert paper["cut"] == [] and paper["scenes"] == 0
-    assert paper["stills"] == (name == "book.html")
+    assert paper["stills"] == (name in ("book.html", "report.html"))
     assert paper["folded"] == 0 and (paper["folds"] > 5) == (name == "book.html")
 
 
 def test_what_is_wrong_with_a_page_is_noticed(seen):
-    wide, _, paper = seen["bad.html"]
+    wide, _, paper, _ = seen["bad.html"]
     assert wide["faint"][0] == ["faint", pytest.approx(2.17, abs=0.01)]
     assert wide["cut"] == ["x"] and all(wide[name] for name in FINE)
     assert paper["cut"] and paper["scenes"] == 1 and paper["folded"] == 1
+
+
+def test_a_page_leads_to_those_beside_it_and_names_the_command_of_the_others(tmp_path):
+    runs = tmp_path / "runs"
+    for name in ("gallery/index.html", "push/report.html"):
+        (runs / name).parent.mkdir(parents=True)
+        (runs / name).touch()
+    said = links.links(runs / "book" / "06_reward.html", runs)
+    assert re.findall('href="([^"]+)"', said) == ["../gallery/index.html", "../push/report.html"]
+    assert "python -m tasks paper" in said and "python -m tasks gallery" not in said
+    assert "../gallery" not in links.links(runs / "gallery" / "index.html", runs)
+    elsewhere = links.links(tmp_path / "report.html", runs)
+    assert "href" not in elsewhere and str(tmp_path) not in elsewhere
 
 
 def test_a_figure_is_described_by_its_own_words():

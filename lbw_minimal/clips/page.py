@@ -101,13 +101,14 @@ def write_page(
     states: np.ndarray | None = None,
     columns: tuple[np.ndarray, ...] = (),
     shown: np.ndarray | None = None,
+    links: str = "",
 ) -> None:
     """Write the page, whole or not at all; what is None was not reached and is left out.
 
     command: what made it; verdict: the sentence on top. frames (T, H, W, 3) uint8, times (T,) s:
     the clip. states (N, 9) m: tip, object and target of the re-enactment. shown (n,): the steps of
     the motion in the film; columns: its re-enactment and translation (n, 84, 84, 3) uint8 and
-    keypoints (n, K, 2).
+    keypoints (n, K, 2). links: HTML that leads to other pages.
     """
     head, _, rest = verdict.partition(": ")
     page = [f"<h1>{escape(task).capitalize()}: {escape(head)}</h1>", f"<p>{escape(rest)}</p>"]
@@ -136,7 +137,8 @@ def write_page(
     again = f"<pre>{escape(command)}</pre>" if tracks is None else ""
     page += section("To decide otherwise", table(OPTIONS), again)
     title = f"{escape(task)}: a clip of one's own"
-    write_atomic(path, HTML.format(title=title, css=CSS + STRIP, body="".join(page)))
+    body = "".join(page)
+    write_atomic(path, HTML.format(title=title, css=CSS + STRIP, links=links, body=body))
 
 
 def nearest(times: np.ndarray, t: float) -> int:

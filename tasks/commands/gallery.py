@@ -21,9 +21,10 @@ from lbw_minimal.films import Film
 from lbw_minimal.imitate import watched
 from lbw_minimal.pictures import data_uri, draw_keypoints
 from lbw_minimal.report import demonstration
-from lbw_minimal.report_texts import CSS
+from lbw_minimal.report_texts import CSS, HTML
 from lbw_minimal.training import write_atomic
 from tasks.commands import Parser, make_folder, own_arm
+from tasks.commands.links import links
 from tasks.commands.viewer import perform
 from tasks.world import TaskEnv
 from tasks.world.scene import FPS
@@ -37,15 +38,7 @@ PAIR = """
 @media (max-width: 40rem) { .pair { grid-template-columns: 1fr } }
 @media print { .pair { grid-template-columns: repeat(2, 1fr) } .pair img { height: 9rem } }
 """
-HEAD = """<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<title>LbW minimal: the five tasks</title>
-<style>{css}</style>
-</head>
-<body>
+HEAD = """
 <h1>The five tasks</h1>
 <p>Above in each row of pictures: frames of the one human video the robot learns from. Below: the
 same frames translated into the robot's world, with the keypoints found on them. Then, at half
@@ -71,14 +64,15 @@ def main(argv: list[str]) -> None:
 def write(out: Path) -> Path:
     """Write the gallery into the folder `out` and return its page."""
     make_folder(out)
-    page = [HEAD.format(css=CSS + PAIR)]
+    page = [HEAD]
     for name in tasks.TASKS:
         page.append(section(name, out))
         print(f"{name}: done", flush=True)
     page.append(own_arm.section(own_arm.prepared()))
-    page.append("</body>\n</html>\n")
-    write_atomic(out / "index.html", "".join(page))
-    return out / "index.html"
+    title, path = "LbW minimal: the five tasks", out / "index.html"
+    body, css = "".join(page), CSS + PAIR
+    write_atomic(path, HTML.format(title=title, css=css, links=links(path), body=body))
+    return path
 
 
 def section(name: str, out: Path) -> str:

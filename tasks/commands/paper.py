@@ -24,6 +24,7 @@ from lbw_minimal.training import write_atomic
 from tasks.commands import Parser, at_least, controls, figures, make_folder, translations
 from tasks.commands.batch import Job, folder, read, run_missing
 from tasks.commands.job import TEST_EPISODES
+from tasks.commands.links import links
 from tasks.commands.probe import NAMES
 from tasks.commands.table import (
     METHODS,
@@ -178,9 +179,10 @@ def write(plan: Plan) -> Path:
     body = str(mistune.html(text)).replace(" %", "\u00a0%")  # no line begins with it
     for path in sorted((plan.out / "figures").glob("*.svg")):  # the page needs no other file
         body = body.replace(f"figures/{path.name}", data_uri("image/svg+xml", path.read_bytes()))
-    page = HTML.format(title="Learning by Watching, made again", css=PAGE_CSS, body=body)
-    write_atomic(plan.out / "paper.html", page)
-    return plan.out / "paper.html"
+    title, path = "Learning by Watching, made again", plan.out / "paper.html"
+    page = HTML.format(title=title, css=PAGE_CSS, links=links(path), body=body)
+    write_atomic(path, page)
+    return path
 
 
 def shown(plan: Plan, name: str, figure: Figure, alt: str) -> str:

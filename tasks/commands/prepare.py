@@ -29,6 +29,7 @@ from lbw_minimal.clips.retarget import FPS, Motion, Scene, lay
 from lbw_minimal.pictures import spread
 from lbw_minimal.training import InputError, write_atomic
 from tasks.commands import Parser, make_folder, within
+from tasks.commands.links import links
 from tasks.world.reenact import Reenactment, reenact
 
 FILM, PAGE = "reenactment.mp4", "prepare.html"
@@ -277,5 +278,6 @@ def write(out: Path, name: str, result: Prepared, command: str) -> Path:
         times=clip.times, scene=result.scene, notes=result.notes, warnings=result.warnings,
         tracks=result.tracks, motion=result.done.motion if result.done else result.motion,
         states=result.done.recording.states if result.done else None, columns=columns, shown=shown,
+        links=links(page),
     )  # fmt: skip
     return page

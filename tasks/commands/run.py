@@ -23,6 +23,7 @@ from lbw_minimal.imitate import PACE, Perception, imitate, learn_perception
 from lbw_minimal.report import wilson, write_report
 from lbw_minimal.training import InputError, counted, peak_memory, seed_everything
 from tasks.commands.job import TEST_EPISODES, Job, check, parser
+from tasks.commands.links import links
 from tasks.commands.probe import PROBE_SEED, probe
 from tasks.world import TaskEnv
 from tasks.world.viewer import mirror
@@ -195,6 +196,7 @@ def report(job: Job, seen: dict[str, Any], first: dict[str, Any], scene: str) ->
         metrics=metrics,
         scene_html=scene,
         command=job.command,
+        links=links(out / "report.html"),
     )
     result = metrics["success"]
     wins, low, high = round(result["rate"] * result["episodes"]), result["low"], result["high"]
