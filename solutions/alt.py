@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 
 def words(figure: Figure) -> str:
@@ -20,14 +21,20 @@ def words(figure: Figure) -> str:
 
 
 def panel(axis: Axes) -> str:
-    """What a panel's title, axes and legend say; empty if they say nothing."""
+    """What a panel's title, axes and legend say, or its texts; empty if nothing is said."""
     x, y = axis.get_xlabel(), axis.get_ylabel()
     if axis.get_label() == "<colorbar>":
         return f"Colours: {y or x}"
     over = f"{y} over {x}" if x and y else y or x
     names = [name for name in axis.get_legend_handles_labels()[1] if name]
     said = [axis.get_title(), over if axis.axison else "", ", ".join(names)]
-    return ": ".join(" ".join(part.split()) for part in said if part)
+    told = ": ".join(" ".join(part.split()) for part in said if part)
+    return told or ", ".join(" ".join(t.get_text().replace("$", "").split()) for t in written(axis))
+
+
+def written(axis: Axes) -> list[Text]:
+    """What is written in a panel that has no axes, as in a diagram; in others, numbers mostly."""
+    return [] if axis.axison else [text for text in axis.texts if text.get_text()]
 
 
 def install() -> None:

@@ -11,9 +11,11 @@ from jupyterlab_server.config import get_page_config
 
 import tests.test_report as a_run
 from lbw_minimal import report
+from lbw_minimal.diagram import method
 from solutions import __main__ as course
 from solutions.alt import words
 from tasks.commands import links
+from tasks.world.viewer import STILL
 from tests import browser
 from tests.grade.feedback import page as feedback
 
@@ -62,9 +64,11 @@ AUDIT = """
 """.replace("LEAST", str(LEAST))
 FINE = {"faint": [], "cut": [], "no alt": 0, "no title": 0, "too wide": 0}
 FINE |= {"no viewport": 0, "no language": 0}
-# Where a screen reader may jump to, and how light the page is, from 0 to 1.
+# Where a screen reader may jump to, what is for paper alone and yet on the screen, and how light
+# the page is, from 0 to 1.
 PLACES = """
 ({main: document.querySelectorAll("main").length, nav: document.querySelectorAll("nav").length,
+  stills: [...document.querySelectorAll(".still")].filter(e => e.checkVisibility()).length,
   light: getComputedStyle(document.body).backgroundColor.match(/[\\d.]+/g)
     .slice(0, 3).reduce((sum, v) => sum + v / 765, 0)})
 """
@@ -96,13 +100,10 @@ def book_page():
     figure = nbformat.v4.new_output(
         "display_data", {"image/png": png}, metadata={"image/png": {"alt": "a square"}}
     )
-    still = (
-        "@media not print { .still { display: none } } @media print { iframe { display: none } }"
-    )
     scene = nbformat.v4.new_output(
         "execute_result",
         {
-            "text/html": f'<style>{still}</style><iframe title="a scene" srcdoc="x"></iframe>'
+            "text/html": f'<style>{STILL}</style><iframe title="a scene" srcdoc="x"></iframe>'
             f'<img class="still" alt="a scene" width="200" src="data:image/png;base64,{png}">'
         },
         execution_count=2,
@@ -187,6 +188,7 @@ def test_a_page_is_dark_where_that_is_asked_for_can_be_read_so_and_has_landmarks
     dark = seen[name][3]
     assert {key: dark[key] for key in FINE} == FINE
     assert dark["light"] < 0.2 and dark["main"] == 1 and dark["nav"] == 1
+    assert dark["stills"] == 0
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -232,6 +234,12 @@ def test_a_figure_is_described_by_its_own_words():
     said = words(figure)
     assert said.startswith("along x: to go (cm) over time (s): OSC. the arm. Colours: reward.")
     assert said.endswith("A picture.")
+
+
+def test_a_diagram_without_axes_is_described_by_what_is_written_in_it():
+    frame, z = np.zeros((84, 84, 3), np.uint8), np.zeros((1, 2))
+    said = words(method(frame, frame, z, frame, z))
+    assert said.startswith("human x_i^E, translated v_i^E, ") and "MUNIT Eq. 1-5" in said
 
 
 def test_the_kernel_of_the_book_puts_a_figures_words_beside_it(tmp_path, monkeypatch):

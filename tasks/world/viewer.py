@@ -107,6 +107,11 @@ def drawing(
     )
 
 
+# JupyterLab shows every picture of an output, whatever a weaker rule says.
+STILL = """@media not print { .still { display: none !important } }
+@media print { iframe { display: none } }"""
+
+
 class Recorder:
     """Records the bodies of a PyBullet client for the browser: all of them, or those listed by id.
 
@@ -234,10 +239,8 @@ class Recorder:
         if not p.isConnected(self.client):
             return scene
         png = f"data:image/png;base64,{base64.b64encode(self.picture()).decode()}"
-        hide = "@media not print { .still { display: none } }"
-        hide += " @media print { iframe { display: none } }"
         still = f'<img class="still" alt="the scene, as it is at the end" src="{png}">'
-        return f"<style>{hide}</style>{scene}{still}"
+        return f"<style>{STILL}</style>{scene}{still}"
 
     def save(self, path: Path | str, title: str = "PyBullet scene", **options: float) -> None:
         """Write `html(title, **options)` to a file, whole or not at all."""
