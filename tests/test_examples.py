@@ -14,7 +14,7 @@ from tests.grade import example
 from tests.grade.__main__ import grade, grade_one
 from tests.grade.cell.answer import PREAMBLE
 from tests.grade.cell.wire import Other, Raised, decode, encode
-from tests.grade.conftest import _exercise, pytest_collection_modifyitems
+from tests.grade.conftest import _exercise, pytest_collection_modifyitems, pytest_configure
 from tests.grade.exercise import everything, find
 from tests.grade.files import File
 from tests.grade.judge import TRY, judge
@@ -216,6 +216,18 @@ def test_an_exercise_is_asked_for_by_its_whole_number(keyword, left):
     config = SimpleNamespace(option=SimpleNamespace(keyword=keyword), hook=hook)
     pytest_collection_modifyitems(config, items)
     assert {_exercise(item) for item in items} == left and len(items) + len(gone) == 4
+
+
+@pytest.mark.parametrize(
+    ("args", "listed"),
+    [(["tests/grade"], True), (["tests/grade/test_notebooks.py::test_exercise[0.1]"], True),
+     (["tests"], False), (["tests/grade", "tests/test_sac.py"], False)],
+)  # fmt: skip
+def test_what_is_open_is_listed_where_exercises_alone_are_asked_for(args, listed, monkeypatch):
+    monkeypatch.chdir(RELEASED.parent)
+    option = SimpleNamespace(fold_skipped=True, reportchars="fE")
+    pytest_configure(SimpleNamespace(args=args, option=option))
+    assert (not option.fold_skipped) == listed == ("s" in option.reportchars)
 
 
 def test_the_terminal_says_what_is_open():

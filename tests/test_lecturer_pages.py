@@ -20,6 +20,7 @@ def write_pages(folder):
     (folder / "items.html").write_text(items.items_page(found, 1))
     class_ = a_class(ODD, ODD + "    # " + "a long line " * 20)
     (folder / "alike.html").write_text(alike.alike_page(class_, [{"6.1"}] * 22))
+    grades[0]["exercises"][0]["example"] = f"r1({'0.25, ' * 60})\n# it is too small"
     (folder / "feedback.html").write_text(page(grades[0]))
 
 

@@ -1,10 +1,17 @@
 """`pytest tests/grade -k 0.1` checks exercise 0.1 alone, and says at its end what is open."""
 
 import re
+from pathlib import Path
+
+HERE = Path(__file__).parent
 
 
 def pytest_configure(config):
-    config.option.fold_skipped = False  # or all that is open is one line
+    """List what is open, exercise by exercise, where nothing but exercises is asked for."""
+    paths = [Path(arg.partition("::")[0]).resolve() for arg in config.args]
+    if not all(path.is_relative_to(HERE) for path in paths):
+        return
+    config.option.fold_skipped = False
     if "s" not in config.option.reportchars:
         config.option.reportchars += "s"
 
