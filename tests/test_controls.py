@@ -1,6 +1,7 @@
 """The controls: robots that see little or nothing, and what they can and cannot do."""
 
 import json
+from types import SimpleNamespace
 
 import gymnasium as gym
 import numpy as np
@@ -112,6 +113,96 @@ def test_robots_without_eyes_do_what_their_names_say():
     random = controls.noise()
     many = np.stack([random(None, t) for t in range(200)])
     assert np.abs(many).max() <= 1 and np.abs(many.mean(0)).max() < 0.2
+
+
+@pytest.fixture
+def compared(monkeypatch):
+    """`compare` on a world of names: who played where, with which seeds; takes are numbered."""
+    played, films = [], []
+
+    class World(gym.Env):
+        observation_space = action_space = gym.spaces.Box(-1, 1, (3,), np.float32)
+
+        def __init__(self, name, jitter):
+            self.name, self.jitter, self.limit = name, jitter, None
+
+    def make(id, jitter, observation="rgb"):
+        return World({"rgb": "seen", "state": "blind"}[observation], jitter)
+
+    def camera(name):
+        return lambda env: World(name, env.jitter)
+
+    def wins(env, robot, episodes, seed=TEST_SEED):
+        played.append((env.name, env.jitter, episodes, seed, env.limit, robot))
+        return len(played)
+
+    def play(env, robot, seed, whole=True):
+        i = seed - controls.TRIAL_SEED
+        assert whole and env.name == "seen"
+        # (done, return, first observation, actions): take 1 earns most, and fails.
+        return i != 1, [3.0, 9.0, 7.0, 5.0][i], np.full(3, i), np.full((2, 3), i)
+
+    def limited(env, steps):
+        env.limit = steps
+        return env
+
+    reward = SimpleNamespace(episode=17)
+    monkeypatch.setattr(controls.tasks, "trained_perception", lambda task, weights: "perception")
+    monkeypatch.setattr(controls.tasks, "pace_film", lambda *asked: films.append(asked) or "film")
+    monkeypatch.setattr(controls.sac, "load", lambda path: SimpleNamespace(act=trained))
+    monkeypatch.setattr(controls.gym, "make", make)
+    monkeypatch.setattr(controls, "watched", lambda env, perception, film: (env, reward))
+    monkeypatch.setattr(controls, "rival_wins", lambda *asked: asked)
+    for name, value in {"Frozen": camera("frozen"), "Grey": camera("grey"), "wins": wins,
+                        "play": play, "TimeLimit": limited}.items():  # fmt: skip
+        monkeypatch.setattr(controls, name, value)
+    beside = {"AVID-m": tasks.ROOT / "avid"}
+    found = controls.compare("push", tasks.ROOT, 0.01, 50, 3, beside, library=4, trials=2)
+    assert films == [("push", 3)]
+    return found, played
+
+
+def trained(obs, deterministic):
+    return np.full(3, 0.5) if deterministic else np.zeros(3)
+
+
+def test_each_control_plays_where_its_name_says_on_the_tests_starts(compared):
+    found, played = compared
+    tests = {name: played[n - 1] for name, n in found.items() if name != "AVID-m"}
+    assert {name: test[0] for name, test in tests.items()} == {
+        "the policy": "seen", "its camera frozen": "frozen", "its camera grey": "grey",
+        "looks once, then replays": "frozen", "blind replay of its best episode": "blind",
+        "best constant action": "blind", "down, then along": "blind", "random actions": "blind",
+        "idle": "blind",
+    }  # fmt: skip
+    assert all(test[1:4] == (0.01, 50, TEST_SEED) for test in tests.values())
+    # A blind robot has no more time than the policy.
+    assert all((test[4] == 17) == (test[0] == "blind") for test in tests.values())
+    assert found["AVID-m"] == ("push", tasks.ROOT / "avid", 0.01, 50)
+
+
+def test_each_control_does_what_its_name_says(compared):
+    found, played = compared
+    does = {name: played[n - 1][5] for name, n in found.items() if name != "AVID-m"}
+    for name in ("the policy", "its camera frozen", "its camera grey"):
+        assert does[name](None, 0).tolist() == [0.5, 0.5, 0.5]  # without noise
+    # Of takes that did the task the one that earned most; a look finds the nearest of them.
+    assert does["blind replay of its best episode"](None, 0).tolist() == [2, 2, 2]
+    looks = does["looks once, then replays"]
+    assert [looks(np.full(3, x), 0)[0] for x in (0.2, 1.2, 2.9)] == [0, 2, 3]
+    assert does["idle"](None, 0).tolist() == [0, 0, 0]
+    assert 0 < np.abs(does["random actions"](None, 0)).max() <= 1
+
+
+def test_blind_robots_are_chosen_among_constants_in_the_plane_and_times_to_turn(compared):
+    """Eight directions in the plane that the camera sees, and eight numbers of steps down."""
+    _, played = compared
+    trials = [p for p in played if p[3] == controls.TRIAL_SEED]
+    assert all(p[0] == "blind" and p[2] == 2 and p[4] == 17 for p in trials)
+    constants = {tuple(p[5](None, 0)) for p in trials[:8]}
+    assert len(constants) == 8 and all(y == 0 and (x, z) != (0, 0) for x, y, z in constants)
+    turns = [next(t for t in range(99) if p[5](None, t)[0] == 1) for p in trials[8:]]
+    assert turns == [3, 6, 9, 12, 15, 18, 21, 24]
 
 
 def test_the_blinded_cameras_show_no_news():

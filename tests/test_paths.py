@@ -1,0 +1,141 @@
+"""Paths in a clip: what counts as seen, as a cut, as a rest, and what the low-pass lets through."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from lbw_minimal.clips.paths import (
+    Tracks,
+    Unusable,
+    ends,
+    longest_piece,
+    low_pass,
+    median3,
+    progress,
+    trusted,
+)
+
+
+def tracks(tip, thing=None, sure=None, cuts=(), side=100, rate=25):
+    """Tracks of n frames, `rate` a second, whose tip (and object) go along x as given."""
+    n = len(tip)
+    tip, thing = (np.stack([np.array(x, float), np.full(n, 50.0)], 1)
+                  for x in (tip, tip if thing is None else thing))  # fmt: skip
+    sure = np.ones(n) if sure is None else np.array(sure, float)
+    return Tracks(np.arange(n) / rate, tip, thing, sure, sure, side, tuple(cuts))
+
+
+def test_a_part_has_its_own_cuts_and_all_that_belongs_to_its_frames():
+    whole = tracks(
+        np.arange(20), thing=np.arange(20) + 3, sure=np.linspace(0, 1, 20), cuts=(4, 9, 12)
+    )
+    part = whole.part(4, 12)
+    assert part.cuts == (5,) and part.times[0] == 4 / 25 and len(part.times) == 8
+    assert part.tip[0, 0] == 4 and part.object[0, 0] == 7 and part.object_sure[0] == 4 / 19
+
+
+def test_the_piece_is_taken_in_which_most_happens_to_what_matters():
+    """First the tip goes far and the object rests, then the other way round."""
+    tip = np.concatenate([np.linspace(0, 60, 20), np.linspace(20, 22, 20)])
+    thing = np.concatenate([np.full(20, 70.0), np.linspace(20, 50, 20)])
+    cut = tracks(tip, thing, cuts=(20,))
+    notes = []
+    assert longest_piece(cut, True, notes).times[0] == 20 / 25
+    assert notes == ["The film is cut 1 times; the piece from 0.8 s to 1.6 s was taken."]
+    assert longest_piece(cut, False, []).times[-1] == 19 / 25
+
+
+def test_a_piece_begins_and_ends_where_the_hand_is_seen():
+    sure = np.ones(30)
+    sure[:5], sure[10:12], sure[-4:] = 0.4, 0.4, 0.4
+    piece = longest_piece(tracks(np.arange(30), sure=sure), False, [])
+    assert (piece.times[0], piece.times[-1]) == (5 / 25, 25 / 25)
+
+
+@pytest.mark.parametrize(("jump", "is_cut"), [(3, False), (5, True)])
+def test_a_change_of_the_picture_is_a_cut_where_something_jumps_by_a_25th_of_the_side(jump, is_cut):
+    tip = np.concatenate([np.full(10, 30.0), np.full(10, 30.0 + jump)])
+    notes = []
+    longest_piece(tracks(tip, cuts=(10,)), False, notes)
+    assert bool(notes) == is_cut
+
+
+def test_what_goes_on_as_fast_as_before_and_after_is_no_cut():
+    notes = []
+    longest_piece(tracks(6.0 * np.arange(20), cuts=(10,)), False, notes)
+    assert not notes
+    longest_piece(
+        tracks(np.r_[6.0 * np.arange(10), 6.0 * np.arange(10) + 70], cuts=(10,)), False, notes
+    )
+    assert notes
+
+
+def test_half_of_the_frames_have_to_be_sure_and_only_those_count():
+    sure = np.tile([0.6, 0.3], 10)
+    x = np.where(sure > 0.5, 2.0 * np.arange(20), 500)
+    times, points = trusted(tracks(x, sure=sure), "tip")
+    np.testing.assert_array_equal(times, np.arange(0, 20, 2) / 25)
+    np.testing.assert_array_equal(points[:, 0], 2.0 * np.arange(0, 20, 2))
+    sure[0] = 0.3
+    for name, reason in (("tip", "no arm is seen"), ("object", "seen in 45% of the frames")):
+        with pytest.raises(Unusable, match=reason):
+            trusted(tracks(x, sure=sure), name)
+
+
+def test_the_median_of_three_takes_out_a_glitch_and_keeps_a_step_and_the_ends():
+    x = np.array([5.0, 0, 0, 9, 0, 4, 4, 4, 7])
+    points = np.stack([x, -x], 1)
+    assert median3(points)[:, 0].tolist() == [5, 0, 0, 0, 4, 4, 4, 4, 7]
+    np.testing.assert_array_equal(median3(points)[:, 1], -median3(points)[:, 0])
+    assert median3(points[:2])[:, 0].tolist() == [5, 0]
+
+
+@pytest.mark.parametrize("hertz", [2, 4])
+def test_the_low_pass_is_a_gaussian_of_a_twentieth_of_a_second(hertz):
+    """A wave loses exp(-(2 pi f sigma)^2 / 2) of its height: 0.82 at 2 Hz, 0.45 at 4."""
+    s = np.arange(0, 4, 1 / 240)
+    t = np.arange(1, 3, 1 / 25)
+    wave = np.stack([np.sin(2 * np.pi * hertz * s), np.cos(2 * np.pi * hertz * s)], 1)
+    left = low_pass(s, wave, t)
+    height = np.exp(-((2 * np.pi * hertz * 0.05) ** 2) / 2)
+    wanted = height * np.stack([np.sin(2 * np.pi * hertz * t), np.cos(2 * np.pi * hertz * t)], 1)
+    np.testing.assert_allclose(left, wanted, atol=0.02)
+
+
+def test_the_low_pass_stays_where_the_path_begins_and_ends():
+    s = np.arange(0, 1, 0.04)
+    path = np.stack([3 * s, 7 - s], 1)
+    np.testing.assert_allclose(low_pass(s, path, np.array([-0.5, 1.5])), path[[0, -1]], atol=1e-9)
+
+
+def test_start_and_end_of_a_way_are_medians_of_its_rests():
+    """It rests at 10, goes to 110 and rests there, and drifts back a little in the end."""
+    rng = np.random.default_rng(0)
+    x = np.r_[np.full(10, 10.0), np.linspace(10, 110, 30), np.full(20, 110.0), np.full(5, 60.0)]
+    path = np.stack([x, np.full(len(x), 40.0)], 1) + rng.normal(0, 0.3, (len(x), 2))
+    start, end = ends(path, 4.0, "object")
+    np.testing.assert_allclose(start, [10, 40], atol=4)
+    np.testing.assert_allclose(end, [110, 40], atol=0.5)
+    assert start[0] < 16
+
+
+def test_what_goes_less_than_asked_never_moves():
+    path = np.stack([np.linspace(0, 3, 9), np.zeros(9)], 1)
+    ends(path, 2.9, "hand")
+    with pytest.raises(Unusable, match="the hand never moves, or by 3 pixels only"):
+        ends(path, 3.1, "hand")
+
+
+def test_progress_is_along_the_way_within_it_and_never_back():
+    path = np.array([[-4.0, 0], [0, 9], [3, 3], [2, 2], [5, 15], [1, 0]])
+    way = progress(path, np.zeros(2), np.array([6.0, 8.0]))  # 10 long; (x 6 + y 8) / 100
+    np.testing.assert_allclose(way, [0, 0.72, 0.72, 0.72, 1, 1])
+
+
+def test_marks_count_as_sure_and_in_the_order_of_their_times():
+    lost = replace(tracks(np.full(11, 50.0)), tip_sure=np.zeros(11))
+    marked = lost.marked("tip", [(30.0, 8.0, 0.4), (10.0, 0.0, 0.0)])
+    np.testing.assert_allclose(marked.tip[[0, 5, 10]], [[10, 0], [20, 4], [30, 8]])
+    assert (marked.tip_sure == 1).all() and (lost.tip_sure == 0).all()
+    assert lost.marked("tip", []) is lost
