@@ -7,7 +7,7 @@ import pytest
 from toy_pushes import CAMERA, HIT, SCENE, SIDE, at, clip, hit, jerk, push, seen
 
 from lbw_minimal.clips.paths import LEAST_FRAMES, Unusable, low_pass, progress
-from lbw_minimal.clips.retarget import APPROACH, FPS, HURRY, apply, lay
+from lbw_minimal.clips.retarget import APPROACH, FPS, HURRY, Motion, apply, fit, lay, pace
 
 PUSHING = np.linspace(1.35, 1.9, 20)  # s, after 12 % of the way and before it is done
 TILTED = np.array([[900.0, 120.0, -300.0], [90.0, -900.0, 300.0]])  # by 6 and 8 degrees
@@ -296,3 +296,142 @@ def test_the_user_may_mirror_and_is_told_when_that_is_wrong():
 def test_the_shortest_piece_that_is_enough_is_enough():
     t = np.linspace(0.9, 2.1, LEAST_FRAMES)
     assert lay(seen(push(t), t), SCENE).arrival > 0
+
+
+# Numbers of the recipe, a little on either side of each -------------------------------------------
+
+
+@pytest.mark.parametrize(("steep", "usable"), [(0.9, True), (-0.9, True), (1.1, False)])
+def test_a_way_of_up_to_45_degrees_is_laid_down(steep, usable):
+    start, end = np.array([100.0, 200]), np.array([300.0, 200 + 200 * steep])
+    if not usable:
+        with pytest.raises(Unusable, match="up or down"):
+            fit(start, end, SCENE, False)
+        return
+    for mirror in (False, True):
+        flip = [-1, 1] if mirror else [1, 1]
+        A = fit(start * flip, end * flip, SCENE, mirror)
+        np.testing.assert_allclose(
+            apply(A, np.stack([start, end]) * flip), [SCENE.start, SCENE.goal], atol=1e-12
+        )
+        # What is upright stays so, as high as what is as wide, and up stays up.
+        np.testing.assert_allclose(A @ (0, -200, 0), [0, 0.15], atol=1e-12)
+
+
+def test_a_goal_that_is_higher_is_got_to_without_leaning():
+    scene = replace(SCENE, start=(0.46, 0.12), goal=(0.68, 0.06))
+    A = fit(np.array([10.0, 50]), np.array([120.0, 90]), scene, False)
+    np.testing.assert_allclose(
+        apply(A, np.array([[10.0, 50], [120, 90]])), [scene.start, scene.goal]
+    )
+    np.testing.assert_allclose(A @ (0, -110, 0), [0, 0.22], atol=1e-12)
+
+
+@pytest.mark.parametrize(("share", "usable"), [(0.3, True), (0.4, False)])
+def test_a_third_of_its_way_is_as_high_as_an_object_may_rise(share, usable):
+    tracks = clip()
+    up = 0.15 * 900 * share * np.sin(np.pi * jerk(tracks.times - 1))
+    raised = replace(tracks, object=tracks.object - np.stack([0 * up, up], 1))
+    if usable:
+        lay(raised, SCENE)
+    else:
+        with pytest.raises(Unusable, match="leaves its straight way"):
+            lay(raised, SCENE)
+
+
+@pytest.mark.parametrize(("ahead", "usable"), [(0.15, True), (0.35, False)])
+def test_a_hand_a_quarter_of_the_way_before_the_object_does_not_push_it(ahead, usable):
+    tracks = clip()
+    front = replace(tracks, tip=tracks.object + (0.15 * 900 * ahead, 0))
+    if usable:
+        lay(front, SCENE)
+    else:
+        with pytest.raises(Unusable, match="the hand is in front of it"):
+            lay(front, SCENE)
+
+
+@pytest.mark.parametrize(("share", "usable"), [(0.93, True), (0.99, False)])
+def test_a_hit_goes_along_for_less_than_most_of_the_way(share, usable):
+    t = np.arange(0, 3, 1 / 30)
+    along = 0.41 * jerk(t / 2 - 0.5)
+    tip = np.stack([0.49 + share * along, np.full(len(t), 0.02)], 1)
+    thing = np.stack([0.53 + along, np.full(len(t), 0.02)], 1)
+    tracks = seen((tip, thing), t)
+    if not usable:
+        with pytest.raises(Unusable, match="pushed and not hit"):
+            lay(tracks, HIT)
+        return
+    motion = lay(tracks, HIT)
+    assert motion.tip[:, 0].max() <= HIT.high[0] + 1e-9  # as far as the arm can go
+    assert motion.tip[:, 0].max() > HIT.high[0] - 0.005
+    assert any("the hit was shortened" in warning for warning in motion.warnings)
+
+
+def test_an_object_is_in_contact_after_12_percent_of_its_way_and_there_at_99():
+    """In the clip that is 1.31 s and 1.92 s: 0.12 and 0.99 of the minimum-jerk profile from 1 s."""
+    motion = lay(clip(fps=120), SCENE)
+    assert motion.times[motion.contact] == pytest.approx(1.31, abs=0.05)
+    assert motion.times[motion.arrival] == pytest.approx(1.92, abs=0.05)
+    assert motion.times[-1] - motion.times[motion.arrival] == pytest.approx(0.3, abs=0.05)
+
+
+def test_before_contact_and_after_arrival_the_tip_is_at_the_height_of_the_push_or_comes_down():
+    motion = lay(clip(), SCENE)
+    np.testing.assert_allclose(motion.tip[motion.contact :, 1], SCENE.height, atol=1e-6)
+    assert motion.tip[: motion.contact, 1].max() > 0.08
+    # From contact to arrival it touches, and then it stays.
+    touching = slice(motion.contact + 1, motion.arrival)
+    gap = motion.object[touching, 0] - motion.tip[touching, 0]
+    np.testing.assert_allclose(gap, SCENE.contact, atol=0.002)
+    np.testing.assert_allclose(np.diff(motion.tip[motion.arrival + 1 :, 0]), 0, atol=1e-9)
+
+
+@pytest.mark.parametrize(("steps", "warned"), [(0.012, False), (0.030, False), (0.042, True)])
+def test_only_what_is_slowed_down_by_half_or_more_is_warned_of(steps, warned):
+    """Four fifths of a step of 3 cm may be asked for: 1.25 times as slow, or 1.75 times."""
+    tip = np.array([0.42, 0.1]) + np.outer(np.arange(6), [steps, 0])
+    motion = Motion(tip, tip, np.arange(6) / 25, 2, 4, np.eye(2, 3), False)
+    paced = pace(motion, SCENE)
+    slower = max(1, steps / (0.8 * 0.03))
+    assert np.abs(np.diff(paced.tip[:-1], axis=0)).max() == pytest.approx(steps / slower)
+    assert paced.contact == round(2 * slower) and paced.arrival == round(4 * slower)
+    assert bool(paced.warnings) == warned
+
+
+@pytest.mark.parametrize("scene", [SCENE, HIT], ids=["push", "hit"])
+def test_a_push_is_hurried_to_twelve_seconds_and_a_hit_is_not(scene):
+    n = 20 * 25 + 1
+    tip = np.stack([np.linspace(0.42, 0.6, n), np.full(n, 0.1)], 1)
+    motion = pace(Motion(tip, tip, np.arange(n) / 25, 250, 400, np.eye(2, 3), False), scene)
+    assert abs(len(motion.tip) - (300 if scene is SCENE else n)) <= 1
+    assert motion.times[-1] == pytest.approx(20) and np.abs(motion.tip[-1] - tip[-1]).max() < 1e-9
+    assert motion.contact == pytest.approx(250 / n * len(motion.tip), abs=1)
+    assert bool(motion.warnings) == (scene is SCENE)
+
+
+def test_of_the_way_before_a_hit_two_seconds_are_kept():
+    """It strikes after five seconds in which the hand goes to and fro within reach."""
+    t = np.arange(0, 7, 1 / 30)
+    tip, thing = hit(t - 5)
+    tip = tip + np.outer(0.01 * np.sin(2 * np.pi * t) * (t < 5.5), [1, 0])
+    motion = lay(seen((tip, thing), t), HIT)
+    begins = motion.times[0]
+    strikes = motion.times[motion.contact]
+    assert strikes - begins == pytest.approx(2.0, abs=0.1)
+
+
+def test_a_hand_that_is_out_of_reach_at_first_is_followed_from_where_it_comes_in():
+    """In from the right of the box by a metre a second; the box begins at 0.74 m."""
+    t = np.arange(0, 3.6, 1 / 30)
+    tip, thing = push(t - 1)
+    far = np.clip(1 - t, 0, None)[:, None] * [-0.5, 0.0]
+    motion = lay(seen((tip + far, thing), t), SCENE)
+    came = 1 - (0.43 - SCENE.low[0] + 0.02) / 0.5  # s, when it is 2 cm out
+    assert motion.times[0] == pytest.approx(came, abs=0.12)
+
+
+def test_a_scene_is_a_hit_where_the_tip_cannot_get_behind_the_goal():
+    near = replace(HIT, goal=(HIT.high[0] + HIT.contact - 0.001, 0.02))
+    assert HIT.hit and not near.hit and not SCENE.hit
+    assert replace(near, goal=(HIT.high[0] + HIT.contact + 0.001, 0.02)).hit
+    assert not replace(HIT, contact=None).hit
