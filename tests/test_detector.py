@@ -260,6 +260,179 @@ def test_weights_come_back_from_their_file_and_others_are_refused(tmp_path):
         Detector.load(WEIGHTS / "push" / "keypoints.safetensors")
 
 
+def test_a_picture_is_fitted_in_the_middle_between_two_bars():
+    """40 x 120 pixels become 28 x 84, with 28 rows of black above and below."""
+    frames = np.full((2, 40, 120, 3), 200, np.uint8)
+    small, scale, corner = detector._fitted(frames)
+    lit = small[0, :, :, 0] > 0
+    assert lit[28:56].all() and lit.sum() == 28 * 84
+    assert corner.tolist() == [0, 28] and scale.tolist() == pytest.approx([0.7, 0.7])
+    upright, _, corner = detector._fitted(frames.transpose(0, 2, 1, 3))
+    assert (upright[0, :, 28:56] == 200).all() and corner.tolist() == [28, 0]
+
+
+def test_the_second_look_takes_in_what_was_found_and_stays_within_the_picture():
+    """Places from 20 to 60 along x: half as much again, and 0.3 of the longer side."""
+    x = np.linspace(20, 60, 101)
+    place = np.stack([np.stack([x, 0 * x + 30], 1), np.stack([x, 0 * x + 50], 1)], 1)
+    sure = np.ones((101, 2))
+    left, top, side = detector._closer(place, sure, (200, 300))
+    assert side == pytest.approx(1.5 * 0.96 * 40 + 90, abs=1)
+    assert (left, top) == (0, 0)  # the middle is (40, 40)
+    left, top, side = detector._closer(place + 120, sure, (200, 300))
+    assert (left, top) == (160 - side // 2, 200 - side)
+    few = sure * (np.arange(101) < 2)[:, None]
+    assert detector._closer(place, few, (200, 300)) == (0, 0, 300)
+
+
+class TwoLooks(Detector):
+    """The first look is told; the second sees the tip at (5, 6) of its square, and no object."""
+
+    def __init__(self, place, sure, near_sure):
+        self.looks, self.second = [], (place, sure)
+        self.near = np.array(near_sure)
+
+    def _look(self, frames):
+        self.looks.append(frames.shape)
+        if len(self.looks) == 1:
+            return self.second
+        n = len(frames)
+        return np.tile(np.float32([5, 6]), (n, 2, 1)), np.tile(self.near, (n, 1))
+
+
+def test_the_closer_look_counts_where_it_is_surer_and_in_the_clips_pixels():
+    place = np.tile(np.float32([[150, 100], [160, 110]]), (10, 1, 1))
+    sure = np.tile([0.6, 0.7], (10, 1))
+    told = TwoLooks(place, sure, [0.9, 0.2])
+    found = told.detect(np.zeros((10, 200, 300, 3), np.uint8))
+    assert told.looks[1][1:3] == (105, 105)  # 1.5 * 10 + 0.3 * 300
+    left, top = round(155 - 52.5), round(105 - 52.5)
+    np.testing.assert_allclose(found.tip[0], [left + 5, top + 6], atol=1)
+    np.testing.assert_allclose(found.object[0], [160, 110])
+    assert found.tip_sure[0] == 0.9 and found.object_sure[0] == 0.7
+
+
+def test_a_second_look_that_would_take_in_most_of_the_picture_is_left_out():
+    place = np.stack([np.stack([np.linspace(0, 250, 20), np.full(20, 90)], 1)] * 2, 1)
+    told = TwoLooks(np.float32(place), np.ones((20, 2)), [1.0, 1.0])
+    told.detect(np.zeros((20, 200, 300, 3), np.uint8))
+    assert len(told.looks) == 1
+
+
+def test_the_network_sees_the_frame_and_what_differs_from_each_reference():
+    """A frame that equals its references shows nothing but itself."""
+    network, shown = Network(), []
+    network.stem.register_forward_pre_hook(lambda _, inputs: shown.append(inputs[0]))
+    frame, others = torch.rand(1, 3, 84, 84), torch.rand(1, 9, 84, 84)
+    network(torch.cat([frame, others], 1))
+    assert torch.equal(shown[0][:, :3], frame)
+    for i in range(3):
+        assert torch.allclose(
+            shown[0][:, 3 + 3 * i : 6 + 3 * i], frame - others[:, 3 * i : 3 * i + 3]
+        )
+
+
+def test_the_loss_is_the_cross_entropy_of_places_and_ten_times_that_of_masks():
+    """Even logits: log 1765 for a place, whether it is there or nowhere, and log 2 for a mask."""
+    places = torch.tensor([[[20.0, 30.0], [np.nan, np.nan]]])
+    masks = torch.zeros(1, 2, 42, 42)
+    even = loss(torch.zeros(1, 2, CELLS**2 + 1), torch.zeros(1, 2, 42, 42), places, masks)
+    assert even.item() == pytest.approx(np.log(1765) + 10 * np.log(2), rel=1e-5)
+    logits = torch.zeros(1, 2, CELLS**2 + 1)
+    logits[0, 1, -1] = 100.0  # sure that the object is nowhere
+    rest = loss(logits, torch.full((1, 2, 42, 42), -50.0), places, masks)
+    assert rest.item() == pytest.approx(np.log(1765) / 2, rel=1e-4)
+
+
+def test_the_target_is_a_gaussian_of_two_pixels():
+    """About the middle of cell (10, 20): exp(-1/2) of the peak a cell, 2 pixels, away."""
+    p = target(torch.tensor([[[21.0, 41.0]] * 2]))[0, 0, :-1].view(CELLS, CELLS)
+    assert p.argmax().item() == 20 * CELLS + 10
+    for row, column in ((20, 11), (21, 10), (20, 9)):
+        assert (p[row, column] / p[20, 10]).item() == pytest.approx(np.exp(-0.5), rel=1e-4)
+
+
+def test_a_place_is_the_mean_of_seven_by_seven_cells_about_its_peak():
+    """A quarter lies three cells from the peak, and counts; what lies four cells on does not."""
+    p = torch.zeros(1, 2, CELLS, CELLS)
+    p[..., 19:22, 9:12] = 0.6 / 9
+    p[..., 20, 13], p[..., 20, 14] = 0.2, 0.2
+    logits = torch.cat([p.flatten(2), torch.zeros(1, 2, 1)], 2).add(1e-12).log()
+    places = (target(torch.tensor([[[21.0, 41.0]] * 2])) + 1e-12).log()
+    # Frames before and after say where the peak is.
+    place, sure = read(torch.cat([places, logits, places]))
+    assert torch.allclose(place[1, 0], torch.tensor([21 + 6 * 0.25, 41.0]), atol=1e-3)
+    assert sure[1, 0].item() == pytest.approx(0.8, abs=1e-3)
+
+
+def test_batches_are_of_the_newest_clips_with_the_places_and_masks_of_the_frame_shown(monkeypatch):
+    """Every four iterations a new clip; half of the batches run backwards."""
+    drawn, clips = [], {}
+
+    def clip(rng):
+        i = len(drawn)
+        drawn.append(i)
+        value = np.arange(3, dtype=np.uint8) + 10 * i
+        frames = np.broadcast_to(value[:, None, None, None], (3, 84, 84, 3)).copy()
+        tip = np.float32([[i, t] for t in range(3)])
+        masks = np.broadcast_to(value[:, None, None, None], (3, 42, 42, 2)).copy()
+        return Clip(frames, tip, tip + 100, masks)
+
+    monkeypatch.setattr(detector, "draw_clip", clip)
+    monkeypatch.setattr(detector, "POOL", 9)
+    pool, rng, backwards = detector._Pool(0), np.random.default_rng(0), []
+    for step in (0, 3, 4, 11):
+        images, places, masks = pool.batch(step, rng)
+        clips = sorted(pool.clips)
+        assert clips == list(range(step // 4, step // 4 + 9)) and len(drawn) == step // 4 + 9
+        grey = ((images + 1) * 127.5).round()[:, :, 0, 0]
+        for shown, (tip, thing), mask in zip(grey, places, masks, strict=True):
+            i, t = tip.int().tolist()
+            assert thing.tolist() == [i + 100, t + 100]
+            assert shown[0] == 10 * i + t and shown[3] == 10 * i + 1  # the frame, the median
+            assert (mask * 255).round().unique().item() == 10 * i + t
+            backwards.append((shown[6] > shown[9]).item())
+            assert {shown[6].item(), shown[9].item()} == {10 * i, 10 * i + 2}
+    assert 0.2 < np.mean(backwards) < 0.8
+
+
+def test_the_learning_rate_warms_up_holds_and_falls_over_the_last_eighth(monkeypatch):
+    rates = []
+    monkeypatch.setattr(detector, "draw_clip", easy)
+    monkeypatch.setattr(detector, "POOL", 8)
+    images = torch.zeros(8, 12, 84, 84), torch.zeros(8, 2, 2), torch.zeros(8, 2, 42, 42)
+    monkeypatch.setattr(detector._Pool, "batch", lambda pool, step, rng: images)
+    weight = torch.nn.Parameter(torch.ones(1))
+
+    class Tiny(torch.nn.Module):
+        def __init__(self):
+            super().__init__()
+            self.w = weight
+
+        def forward(self, images):
+            return self.w * torch.zeros(8, 2, CELLS**2 + 1), self.w * torch.zeros(8, 2, 42, 42)
+
+    monkeypatch.setattr(detector, "Network", Tiny)
+    step = torch.optim.AdamW.step
+    monkeypatch.setattr(
+        torch.optim.AdamW,
+        "step",
+        lambda self, *a: rates.append(self.param_groups[0]["lr"]) or step(self, *a),
+    )
+    _, log = detector.train(iterations=1000, seed=0)
+    assert rates[0] == pytest.approx(3e-5) and rates[49] == pytest.approx(1.5e-3)
+    assert rates[99:879] == pytest.approx(780 * [3e-3])
+    assert rates[940] == pytest.approx(1.5e-3, rel=0.02) and rates[-1] < 3e-5
+    assert [row["step"] for row in log[:3]] == [50, 100, 150]
+    # Each row is the mean of its own fifty steps, which all lose the same.
+    assert {row["loss"] for row in log} == {log[0]["loss"]}
+
+
+def test_a_detector_in_use_is_frozen():
+    network = Detector(Network().train()).network
+    assert not network.training and not any(p.requires_grad for p in network.parameters())
+
+
 # The object by its corners
 
 
@@ -304,6 +477,84 @@ def test_the_grounds_corners_are_not_the_objects():
     which, middle = corners.objects_own(np.stack([own, still, far], 1), path, unit)
     assert which.tolist() == [True, False, False]
     assert np.allclose(middle[0], (-2, -1))
+
+
+def test_corners_are_followed_to_a_tenth_of_a_pixel_from_the_pictures_edge():
+    """A texture goes by (3, 1) pixels a frame, and so do they; a pixel's middle is at 0.5."""
+    rng = np.random.default_rng(0)
+    wide = cv2.GaussianBlur(rng.integers(0, 255, (160, 200)).astype(np.uint8), (0, 0), 2)
+    grey = np.stack([wide[20 - t : 120 - t, 30 - 3 * t : 150 - 3 * t] for t in range(5)])
+    paths = corners.follow(grey)
+    whole = np.isfinite(paths).all((0, 2))
+    assert whole.sum() > 20
+    steps = np.diff(paths[:, whole], axis=0)
+    assert np.abs(np.median(steps, axis=(0, 1)) - [3, 1]).max() < 0.05
+    first = cv2.goodFeaturesToTrack(grey[0], 500, 0.005, 2)[:, 0]
+    np.testing.assert_allclose(paths[0], first + 0.5)
+
+
+def test_a_corner_that_does_not_come_back_is_lost():
+    """Behind a bar that comes down there is nothing to come back to."""
+    rng = np.random.default_rng(0)
+    still = cv2.GaussianBlur(rng.integers(0, 255, (100, 120)).astype(np.uint8), (0, 0), 2)
+    hidden = still.copy()
+    hidden[:, 40:80] = rng.integers(0, 255, (100, 40))
+    paths = corners.follow(np.stack([still, still, hidden]))
+    behind = np.abs(paths[0, :, 0] - 60) < 12
+    lost = ~np.isfinite(paths[2, :, 0])
+    assert lost[behind].mean() > 0.9 and lost[np.abs(paths[0, :, 0] - 60) > 32].mean() < 0.1
+
+
+def own(corner, path):
+    return corners.objects_own(corner[:, None], path, 1.0)[0].tolist()[0]
+
+
+def test_a_corner_is_the_objects_if_it_is_near_and_moves_alike():
+    """Near is 12 of 84 pixels, alike 1.5: x and y off their median, half of the time less."""
+    path = np.stack([np.linspace(20, 60, 9), np.full(9, 50.0)], 1)
+    wobble = np.array([1.0, -1, 1, -1, 0, 1, -1, 1, -1])[:, None] * (1, 0)
+    assert own(path + (0, 11), path) and not own(path + (0, 13), path)
+    assert own(path + 1.3 * wobble, path) and not own(path + 1.8 * wobble, path)
+
+
+def test_a_corner_is_the_objects_if_it_goes_a_quarter_of_its_way_and_two_pixels():
+    """The object stands almost all the time, so a corner that stands is as like it."""
+    for far, goes, is_own in ((40, 12, True), (40, 8, False), (6, 2.5, True), (6, 1.8, False)):
+        path = np.stack([20 + far * (np.arange(9) == 8), np.full(9, 50.0)], 1)
+        corner = np.stack([20 + goes * (np.arange(9) == 8), np.full(9, 53.0)], 1)
+        assert own(corner, path) == is_own, (far, goes)
+
+
+def test_a_corner_has_to_be_seen_with_the_object_in_three_frames():
+    path = np.stack([np.linspace(20, 60, 9), np.full(9, 50.0)], 1)
+    for seen, is_own in (([0, 4, 8], True), ([0, 8], False)):
+        corner = np.full((9, 2), np.nan)
+        corner[seen] = path[seen] + 1
+        assert own(corner, path) == is_own
+
+
+def test_large_frames_are_shrunk_and_places_come_back_in_their_pixels():
+    """720 pixels wide: followed at 480."""
+    frames, path, found = slides(T=16)
+    large = np.stack([cv2.resize(f, (720, 720), interpolation=cv2.INTER_CUBIC) for f in frames])
+    scale = 720 / 168
+    refined, known = corners.followed(large, found.object * scale)
+    off = (refined - path * scale)[known]
+    assert known.mean() > 0.8 and np.abs(off - np.median(off, axis=0)).max() < 0.6 * scale
+    assert np.abs(np.median(off, axis=0)).max() < scale
+
+
+def test_where_corners_say_where_it_is_the_object_is_as_sure_as_usual():
+    """Frames in which it was hardly seen are as sure as the median of those where it was."""
+    frames, path, found = slides()
+    sure = np.full(30, 0.8, np.float32)
+    sure[12:16], sure[20] = 0.2, 0.95
+    place = found.object.copy()
+    place[12:16] = (150, 20)  # anywhere
+    refined = refine(frames, Found(found.tip, place, sure, sure))
+    assert refined.object_sure[12:16] == pytest.approx(4 * [0.8])
+    assert refined.object_sure[20] == pytest.approx(0.95)
+    assert np.abs(refined.object[12:16] - path[12:16]).max() < 2
 
 
 # What is shipped

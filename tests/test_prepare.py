@@ -1,13 +1,16 @@
 """`python -m tasks prepare`: a filmed clip goes in, a page, a film and a verdict come out."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from toy_clips import shows
 
 from lbw_minimal import video
 from lbw_minimal.clips.detector import Found
 from lbw_minimal.clips.page import write_page
 from lbw_minimal.clips.paths import Unusable
-from lbw_minimal.clips.reader import read_clip
+from lbw_minimal.clips.reader import Clip, read_clip
 from lbw_minimal.training import InputError
 from tasks import VIDEOS, bare
 from tasks.__main__ import main
@@ -181,3 +184,69 @@ def test_the_page_is_safe_from_the_names_of_files(scene, tmp_path):
 
 def test_reasons_are_sentences():
     assert str(Unusable("it rains", "wait")) == "it rains; wait."
+
+
+def test_a_film_of_the_kits_own_is_played_at_25_frames_a_second_by_its_time_stamps(monkeypatch):
+    """At 50 frames a second every second one; where frames come unevenly, the nearest."""
+    kept = []
+    monkeypatch.setattr(prepare, "keep", lambda result, frames: kept.append(frames[:, 0, 0, 0]))
+    frames = np.arange(40, dtype=np.uint8)[:, None, None, None] * np.ones((84, 84, 3), np.uint8)
+    for times, wanted in (
+        (np.arange(21) / 50, list(range(0, 21, 2))),
+        ([0.0, 0.03, 0.05, 0.09, 0.12, 0.17], [0, 1, 3, 4, 5]),
+    ):
+        clip = Clip(frames[: len(times)], np.array(times), [], [])
+        result = Prepared(clip, None)
+        prepare.take_as_it_is(result)
+        assert kept.pop().tolist() == wanted and "taken as it is" in result.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("off", "share", "own"),
+    [(6, 1.0, True), (11, 1.0, True), (13, 1.0, False), (200, 0.005, True), (200, 0.02, False)],
+)
+def test_the_kits_own_film_begins_with_the_scenes_picture_in_99_of_100_pixels(off, share, own):
+    first = np.full((84, 84, 3), 30, np.uint8)
+    shown = first.copy()
+    shown.reshape(-1)[: round(share * first.size)] += off
+    clip = Clip(np.stack([shown] * 3), np.arange(3) / 25, [], [])
+    assert prepare.is_own(clip, first) == own
+    assert not prepare.is_own(replace(clip, times=np.arange(3) / 15), first)  # too slow
+    assert not prepare.is_own(replace(clip, frames=clip.frames[:, :, :80]), first)  # not square
+
+
+def test_what_was_found_is_laid_by_the_clips_shorter_side_cuts_and_marks(monkeypatch):
+    laid = {}
+    n = 6
+    clip = Clip(np.zeros((n, 90, 160, 3), np.uint8), 2 + np.arange(n) / 20, [4], [])
+    nothing = Found(np.zeros((n, 2)), np.zeros((n, 2)), np.zeros(n), np.zeros(n))
+    monkeypatch.setattr(prepare, "look", lambda frames: nothing)
+    monkeypatch.setattr(prepare.footage, "check", lambda frames, cuts: [f"cut at {cuts}"])
+    monkeypatch.setattr(
+        prepare,
+        "lay",
+        lambda *asked: laid.update(zip(("tracks", "scene", "mirror"), asked, strict=True)),
+    )
+    result = Prepared(clip, "scene")
+    choices = Choices(mirror=True, tip=((10.0, 20.0, 2.1),), object=((30.0, 40.0, 2.2),))
+    follow(result, choices)
+    tracks = laid["tracks"]
+    assert (tracks.side, tracks.cuts, laid["scene"], laid["mirror"]) == (90, (4,), "scene", True)
+    assert tracks.tip[2].tolist() == [10, 20] and tracks.object[2].tolist() == [30, 40]
+    assert result.warnings == ["cut at [4]"] and result.tracks is tracks
+    assert result.notes[0].startswith("6 frames at 20 a second")
+    for wrong in ((161.0, 20.0, 2.1), (10.0, 91.0, 2.1), (10.0, 20.0, 1.9), (10.0, 20.0, 2.3)):
+        with pytest.raises(Unusable, match=r"is outside of 160x90 pixels and 2\.0 to 2\.2 s"):
+            follow(Prepared(clip, "scene"), Choices(tip=(wrong,)))
+
+
+def test_the_film_is_kept_as_it_comes_back_from_its_file():
+    """What is learnt from has been through the codec, as it has when the file is given again."""
+    rng = np.random.default_rng(0)
+    frames = np.stack([np.full((84, 84, 3), 90, np.uint8)] * 12)
+    for i, frame in enumerate(frames):
+        frame[20:60, 3 * i : 3 * i + 30] = rng.integers(0, 255, (40, 30, 3))
+    result = Prepared(None, None)
+    prepare.keep(result, frames)
+    assert result.film.shape == frames.shape and 0 < shows(result.film, frames) < 20
+    assert result.file[4:8] == b"ftyp"
