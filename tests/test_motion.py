@@ -1,0 +1,101 @@
+"""What moves and where a film jumps, on pictures of a few shapes whose motion is known."""
+
+import cv2
+import numpy as np
+import pytest
+
+from lbw_minimal.clips import motion
+from lbw_minimal.clips.motion import before_background, differs, high_pass, jumps, moves
+
+
+def ground(side=84, seed=0):
+    rough = np.random.default_rng(seed).integers(60, 180, (12, 12, 3), np.uint8)
+    return cv2.resize(rough, (side, side), interpolation=cv2.INTER_CUBIC)
+
+
+def film(x, size=10, side=84, level=240):
+    """A bright square that goes along x before a still ground."""
+    frames = np.repeat(ground(side)[None], len(x), axis=0)
+    for frame, left in zip(frames, np.rint(x).astype(int), strict=True):
+        frame[40 : 40 + size, left : left + size] = level
+    return frames
+
+
+def test_an_even_change_of_light_is_no_motion():
+    frames = film(np.full(3, 20.0))
+    brighter = np.clip(frames + np.array([0, 20, 40])[:, None, None, None], 0, 255).astype(np.uint8)
+    passed = high_pass(brighter)
+    assert np.abs(passed.mean(axis=(1, 2))).max() < 1
+    assert (np.abs(passed[1] - passed[0]) > 4).mean() < 0.02
+    assert not differs(passed[0], passed[2])
+
+
+def test_motion_is_35_pixels_that_change_by_more_than_16_grey_levels_up_or_down():
+    still = np.zeros((84, 84), np.float32)
+    for level, pixels, moved in ((17, 36, 1), (17, 35, 0), (15, 400, 0), (-17, 36, 1)):
+        other = still.copy()
+        other.reshape(-1)[:pixels] = level
+        assert differs(still, other) == differs(other, still) == bool(moved), (level, pixels)
+
+
+def test_the_background_is_what_most_frames_show():
+    x = np.r_[np.full(6, 10.0), np.full(15, 50.0)]
+    still, background, moving = before_background(film(x))
+    assert moving and np.abs(still[-1] - background).max() < 1e-3
+    assert differs(still[0], background)
+    assert not moves(film(np.full(9, 30.0))) and moves(film(np.linspace(10, 30, 9)))
+
+
+def test_at_most_sixty_frames_are_looked_at_from_first_to_last():
+    some = motion.some(np.arange(200))
+    assert len(some) == 60 and (some[0], some[-1]) == (0, 199)
+    assert len(motion.some(np.arange(20))) == 20
+
+
+def test_an_even_motion_has_no_jump_and_one_that_leaves_a_piece_out_has_one():
+    """Two pixels a frame; then it is 40 pixels further on at once."""
+    x = 8.0 + 1.0 * np.arange(40)
+    times = np.arange(40) / 25
+    assert jumps(film(x, side=112), times) == []
+    x[20:] += 40
+    assert jumps(film(x, side=112), times) == [20]
+
+
+def test_another_scene_is_a_jump_and_so_is_the_way_back():
+    one, other = film(np.linspace(10, 30, 20)), np.repeat(ground(seed=5)[None], 8, axis=0)
+    both = np.concatenate([one[:10], other, one[10:]])
+    assert jumps(both, np.arange(28) / 25) == [10, 18]
+
+
+def test_a_gap_of_half_a_second_is_a_jump_only_where_something_changed():
+    times = np.arange(20) / 25
+    times[10:] += 0.6
+    x = np.full(20, 30.0)
+    assert jumps(film(x, side=112), times) == []
+    x[10:] = 50
+    assert jumps(film(x, side=112), times) == [10]
+    # Two frames a second are a slow camera's usual pace, and a gap of 0.3 s is short.
+    slow = 30 + 2.0 * np.arange(8)
+    assert jumps(film(slow, side=112), 0.6 * np.arange(8)) == []
+    times[10:] -= 0.3
+    even = 30.0 + np.arange(20)
+    assert jumps(film(even, side=112), times) == []
+
+
+def test_the_first_four_grey_levels_of_a_change_do_not_count():
+    assert motion._strong(np.array([[4.0, -4.0], [6.0, -9.0]])) == pytest.approx((2 + 5) / 4)
+
+
+def test_flow_explains_what_only_moved():
+    """A square on its way leaves next to nothing; one that appears leaves all of its change."""
+    size = 112, 112
+    change, residual = motion._unexplained(film([30.0, 33, 36], size=30, side=112), size)
+    assert (residual < 0.35 * change).all() and (change > 0.5).all()
+    there = film([30.0, 30], size=30, side=112)
+    there[0] = ground(112)
+    change, residual = motion._unexplained(there, size)
+    assert residual[0] > 0.5 * change[0] > 0.5
+
+
+def test_fewer_than_three_frames_have_no_jump():
+    assert jumps(film([10.0, 60.0]), np.array([0, 3.0])) == []
