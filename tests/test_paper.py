@@ -63,6 +63,40 @@ def test_tables_of_steps_and_videos_by_hand():
     assert lines[3] == "| push | 95 % (76-99) | 9/10, 10/10 | 3,000 |"
 
 
+def test_controls_are_of_the_first_seeds_runs_and_the_recipes_have_the_rivals_beside(
+    tmp_path, monkeypatch
+):
+    asked = []
+
+    def measure(task, run, episodes, seed, beside, jitters, brief):
+        asked.append((task, run.name, episodes, seed, beside, tuple(jitters), brief))
+        return {"task": task}
+
+    monkeypatch.setattr(controls, "measure", measure)
+    some = plan(tmp_path)
+    assert [note["task"] for note in paper.measured(some, "", (0.1,))] == list(tasks.TASKS)
+    beside = {
+        "Classifier reward": some.runs / "push-0-classifier", "AVID-m": some.runs / "push-0-avid",
+    }  # fmt: skip
+    assert asked[1] == ("push", "push-0", 100, 0, beside, (0.1,), False)
+    paper.measured(some, "wide", (0.02,))
+    assert asked[6] == ("push", "push-0-wide", 100, 0, {}, (0.02,), False)
+    paper.measured(some, "wide", (0.02,))  # what is written is not measured again
+    assert len(asked) == 10 and (tmp_path / "wide" / "push.json").exists()
+    smoke = plan(tmp_path / "smoke", fast=True, episodes=2, seeds=1)
+    paper.measured(smoke, "", (0.1,))
+    assert asked[10][2] == 2 and asked[10][6]
+
+
+def test_each_kind_of_run_has_its_seeds(tmp_path):
+    three, one = plan(tmp_path), plan(tmp_path, seeds=1)
+    of = {
+        c: len(three.seeds_of(c)) for c in ("", "wide", "classifier", "avid", "avid-5", "avid-long")
+    }
+    assert of == {"": 3, "wide": 3, "classifier": 2, "avid": 2, "avid-5": 1, "avid-long": 1}
+    assert {len(one.seeds_of(c)) for c in of} == {1}
+
+
 @pytest.fixture(scope="module")
 def page(tmp_path_factory, table_one):
     """The page of a smoke run, of which only what takes no training is real."""

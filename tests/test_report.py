@@ -135,6 +135,50 @@ def test_down_is_down_in_the_plots_of_keypoints():
         assert top < bottom
 
 
+def test_the_picture_behind_the_paths_is_as_the_camera_saw_it():
+    """Its first row at y = -1, the top; and each path runs through its keypoints."""
+    z = np.stack([np.linspace([-0.5, 0.2], [0.5, -0.4], 4), np.zeros((4, 2))], 1)
+    axis = pictures.paths(z + 0.1, z, np.zeros((84, 84, 3), np.uint8)).axes[0]
+    assert list(axis.images[0].get_extent()) == [-1, 1, 1, -1] and axis.images[0].origin == "upper"
+    shown, own = (line.get_xydata() for line in axis.lines[:2])
+    np.testing.assert_allclose(shown, z[:, 0] + 0.1)
+    np.testing.assert_allclose(own, z[:, 0])
+    start, end = (line.get_xydata()[0] for line in axis.lines[2:4])
+    np.testing.assert_allclose([start, end], z[[0, -1], 0])
+
+
+def test_courses_run_over_the_share_of_each_video():
+    z_demo, z = np.zeros((5, 1, 2)), np.zeros((3, 1, 2))
+    z_demo[:, 0, 0], z[:, 0, 1] = np.arange(5), np.arange(3)
+    x, y = pictures.courses(z_demo, z).axes
+    np.testing.assert_allclose(
+        x.lines[0].get_xydata(), np.stack([np.arange(5) / 4, np.arange(5)], 1)
+    )
+    np.testing.assert_allclose(y.lines[1].get_xydata(), [[0, 0], [0.5, 1], [1, 2]])
+
+
+def test_parts_of_the_reward_come_after_their_steps_and_0_is_at_the_top():
+    rows = [{"r1": -1.0, "r2": -2.0}, {"r1": -3.0, "r2": -0.5}]
+    (axis,) = pictures.parts(rows, fps=25, success=2).axes
+    np.testing.assert_allclose(axis.lines[0].get_xydata(), [[0.04, -1], [0.08, -3]])
+    np.testing.assert_allclose(axis.lines[1].get_ydata(), [-2, -0.5])
+    np.testing.assert_allclose(axis.lines[2].get_xdata(), 0.08)  # where the task was done
+    assert axis.get_ylim()[1] >= 0
+
+
+def test_columns_say_at_which_second_they_are_and_what_the_classifier_said():
+    frames = np.zeros((50, 84, 84, 3), np.uint8)
+    html = report.demonstration(frames, None, None, 25, np.arange(50) - 9.5)
+    captions = re.findall(r"<figcaption>(.*?)</figcaption>", html)
+    assert len(captions) == 8 and captions[0] == "0.0 s, -9.5" and captions[-1] == "2.0 s, +39.5"
+
+
+def test_digits_read_on_their_colours():
+    """Black on yellow and orange, white on blue and black."""
+    inks = {pictures.COLOURS[k]: pictures.ink(k)[0] for k in range(8)}
+    assert inks["#F0E442"] == inks["#E69F00"] == 0 and inks["#0072B2"] == inks["#000000"] == 255
+
+
 def test_the_page_has_every_section(page):
     assert len(titles(page)) == 10
     assert (

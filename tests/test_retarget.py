@@ -176,6 +176,18 @@ def test_a_reach_goes_from_the_arms_start_to_the_mark():
     assert abs(motion.arrival / FPS - 1.3) < 0.2 and motion.object is None
 
 
+def test_a_hand_that_goes_back_after_a_reach_has_stayed_at_the_mark():
+    """Half a second there, then home again, which the motion does not do."""
+    scene = replace(SCENE, start=(0.46, 0.12), goal=(0.68, 0.06), tip=(0.46, 0.12), contact=None)
+    t = np.arange(0, 3, 1 / 30)
+    way = jerk(t / 1.2) - 0.5 * jerk((t - 1.3) / 1.2)
+    x = np.array([100.0, 300.0]) + way[:, None] * [200.0, 90.0]
+    motion = lay(seen((x, x), t, camera=np.eye(2, 3)), scene)
+    np.testing.assert_allclose(motion.tip[motion.arrival :] - motion.tip[-1], 0, atol=1e-9)
+    np.testing.assert_allclose(motion.tip[-1], scene.goal, atol=0.006)
+    assert len(motion.tip) - motion.arrival == pytest.approx(0.3 * FPS, abs=1.5)
+
+
 @pytest.mark.parametrize("speed", [0.4, 0.8])
 def test_a_hit_is_as_fast_as_it_was(speed):
     t = np.arange(0, 2.5, 1 / 120)

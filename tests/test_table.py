@@ -5,6 +5,7 @@ import shutil
 from importlib import import_module
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from lbw_minimal.report import wilson
@@ -104,6 +105,59 @@ def test_ablation_has_a_row_a_mend_and_a_picture(runs):
     assert len(text.splitlines()) == 2 + 2 + len(MENDS)
     assert "| without timed | 0 % (0-11) | 0/10, 0/10, 0/10 |" in text
     assert (runs / "ablation.png").stat().st_size > 5000
+
+
+def test_bars_and_their_whiskers_are_rates_and_intervals():
+    """9 of 10: Wilson's 59.6 to 98.2 %. Push above slide, both in their own colour."""
+    rows = {"all": [[{"wins": 9, "episodes": 10}], [{"wins": 0, "episodes": 10}]]}
+    (axis,) = ablation.bars(rows).axes
+    push, slide = axis.patches
+    assert (push.get_width(), slide.get_width()) == pytest.approx((90, 0))
+    assert push.get_y() < slide.get_y() and axis.get_ylim()[0] > axis.get_ylim()[1]
+    low, high = np.sort(axis.collections[0].get_segments()[0][:, 0])
+    assert (low, high) == pytest.approx((59.6, 98.2), abs=0.1)
+    assert ablation.ABLATED == ("push", "slide")
+    assert [container.get_label() for container in axis.containers[::2]] == ["push", "slide"]
+
+
+def test_r_squared_is_of_tip_and_then_object_first_across_then_down():
+    scores = {"tip_x": 0.1, "tip_y": 0.2, "object_x": 0.3, "object_y": None}
+    row = {"perception": {"robot": {name: {"r2": r2} for name, r2 in scores.items()}}}
+    assert table.r_squared(row, "robot") == "0.100 / 0.200 / 0.300 / -"
+
+
+def test_time_is_of_all_stages_in_hours_and_a_tasks_in_minutes_on_average():
+    rows = [{"stages": {"a": 1800, "b": 1800}, "wins": 1, "episodes": 1, "steps": 1},
+            {"stages": {"a": 7200}, "wins": 1, "episodes": 1, "steps": 1}]  # fmt: skip
+    assert table.hours(rows) == "3.0 h"
+    assert table.success("push", rows, rows)[-2] == "90 min"
+
+
+def test_what_is_finished_has_as_many_episodes_as_asked_and_interrupted_runs_go_on(tmp_path):
+    finish(tmp_path / "push-0", 3, episodes=10)
+    assert batch.finished(tmp_path / "push-0", 10) and not batch.finished(tmp_path / "push-0", 100)
+    assert not batch.finished(tmp_path / "push-9", 10)
+    assert "--resume" not in batch.command(tmp_path, "push", 0, "", 10)
+    (tmp_path / "push-0" / "settings.json").write_text("{}")
+    assert "--resume" in batch.command(tmp_path, "push", 0, "", 100)
+    row = batch.read(tmp_path, "push", 0)
+    assert (row["wins"], row["wins_at_end"], row["episodes"], row["steps"]) == (3, 2, 10, 10_000)
+
+
+def test_runs_of_the_page_differ_from_the_recipe_by_what_their_names_say():
+    """Three times push's 3,000 steps; starts moved by 2 cm; other numbers of videos."""
+    steps = ["--set", "policy_steps=9000"]
+    assert batch.ALONE["classifier-long"][-2:] == batch.LATER["avid-long"][1][-2:] == steps
+    assert batch.LATER["wide"] == ("", ["--jitter", "0.02"])
+    assert batch.ALONE["avid-motion"][-1] == "motion=1"
+    assert [batch.LATER[f"avid-{n}"][1][-1] for n in (1, 5)] == ["1", "5"]
+    assert [batch.ALONE[f"videos-{n}"][-1] for n in (5, 15)] == ["5", "15"]
+
+
+def test_table_two_is_the_papers():
+    """Classifier-reward, AVID-m and LbW; reach, push, slide, coffee and drawer."""
+    rates = [[table.TABLE_II[c][t] for t in TASKS] for c in ("classifier", "avid", "")]
+    assert rates == [[100, 100, 30, 50, 70], [100, 60, 0, 40, 50], [100, 100, 80, 70, 80]]
 
 
 def test_finished_runs_are_not_repeated_and_others_go_on(tmp_path, monkeypatch):
