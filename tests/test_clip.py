@@ -3,6 +3,7 @@ colours and at its true time; what cannot be read gets one true sentence."""
 
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import av
 import cv2
@@ -292,3 +293,78 @@ def test_4k_is_shrunk_to_what_it_shows(tmp_path):
     assert clip.frames.shape == (4, 180, 320, 3)
     small = [cv2.resize(f, (320, 180), interpolation=cv2.INTER_AREA) for f in large]
     assert shows(clip.frames, small) < 8
+
+
+def film_of(stamps, rate=25.0, every=1):
+    return SimpleNamespace(
+        stamps=list(stamps), frames=np.zeros(len(stamps)), every=every, losses=[],
+        stream=SimpleNamespace(rate=rate),
+    )  # fmt: skip
+
+
+def test_times_that_fall_back_are_put_behind_one_another():
+    """Two recordings in one file; frames that come a little out of order are sorted."""
+    film = film_of([0, 0.04, 0.08, 5.0, 0.0, 0.04, 0.08])
+    times = clips._rising(film)
+    assert times == pytest.approx([0, 0.04, 0.08, 5.0, 5.04, 5.08, 5.12]) and not film.losses
+    assert clips._rising(film_of([0, 0.08, 0.04, 0.12])) == pytest.approx([0, 0.04, 0.08, 0.12])
+
+
+def test_where_times_are_missing_or_stand_still_the_rate_is_believed():
+    """Every third frame of 30 a second is kept."""
+    for stamps in ([0, None, 0.2, 0.3], [0.0, 0, 0, 0]):
+        film = film_of(stamps, rate=30.0, every=3)
+        assert clips._rising(film) == pytest.approx([0, 0.1, 0.2, 0.3])
+        assert film.losses == ["Its frames have no time stamps; 30 a second were assumed."]
+
+
+def test_the_longest_piece_is_that_of_most_seconds_and_begins_at_0():
+    """Three frames in 2 s outlast five in 0.4."""
+    frames = np.arange(11, dtype=np.uint8)
+    times = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 5.0, 6.0, 7.0, 8.0, 8.1, 8.2])
+    piece = steady(clips.Clip(frames, times, [5, 8], ["a note"], ["a loss"]))
+    assert piece.frames.tolist() == [5, 6, 7] and piece.times.tolist() == [0, 1, 2]
+    assert (piece.cuts, piece.notes, piece.losses) == ([], ["a note"], ["a loss"])
+
+
+def test_of_a_long_film_the_longest_stretch_is_chosen_with_a_second_around_it():
+    """A small square moves from 10 to 14 s, and from 40 to 60 s; key frames are a second apart."""
+    at = np.zeros(100, int)
+    at[10:14], at[14:40], at[40:60], at[60:] = np.arange(4), 4, 4 + np.arange(20), 24
+    frames = np.full((100, 84, 84, 3), 100, np.uint8)
+    for frame, x in zip(frames, at, strict=True):
+        frame[30:50, 2 * x : 2 * x + 20] = 220
+    film = clips._Film("film", clips.Stream(0, 640, 480, 1.0, 25.0, 100.0), None, None, None, True)
+    said = film._choose(list(np.arange(100.0)), frames)
+    assert (film.start, film.end) == (39, 61) or (film.start, film.end) == (38, 61)
+    assert said.startswith(f"Of 99 seconds, {film.start:.1f} to 61.0 were taken")
+    assert film._choose(list(np.arange(100.0)), frames[:1].repeat(100, 0)) == ""
+
+
+@pytest.mark.parametrize(("covered", "whole", "refused"), [(9.6, 1, 0), (9.4, 1, 1), (5, 0, 0)])
+def test_a_film_is_cut_short_if_a_twentieth_of_what_its_header_promises_is_missing(
+    covered, whole, refused
+):
+    film = clips._Film("film", clips.Stream(0, 640, 480, 1.0, 25.0, 10.0), None, None, None, True)
+    decoder = SimpleNamespace(promised=10.0, covered=covered, packets=9)
+    if refused:
+        with pytest.raises(InputError, match=r"promises 10\.0 s and 9\.4 s can be read"):
+            film._check(decoder, 9, bool(whole))
+    else:
+        film._check(decoder, 9, bool(whole))
+    with pytest.raises(InputError, match="none of its pictures can be decoded"):
+        film._check(SimpleNamespace(promised=0, covered=0, packets=3), 0, True)
+    with pytest.raises(InputError, match="the video has no frames"):
+        film._check(SimpleNamespace(promised=0, covered=0, packets=0), 0, True)
+
+
+def test_a_film_is_thinned_by_halves_until_it_fits(tmp_path, monkeypatch):
+    """Room for 20 of 50 frames: every fourth is kept, with its own time."""
+    path = encode(tmp_path / "a.mp4", reach(50))
+    monkeypatch.setattr(clips, "MOST", 20 * H * W * 3)
+    monkeypatch.setattr(clips._Film, "_by_key_frames", lambda film: "")
+    monkeypatch.setattr(clips._Film, "_choose", lambda *_: "")
+    clip = read_clip(path)
+    assert clip.times == pytest.approx(np.arange(0, 50, 4) / 25, abs=1e-3)
+    assert shows(clip.frames, reach(50)[::4]) < 8
+    assert clip.losses == ["50 frames are many; every 4th is used, 13 in all."]

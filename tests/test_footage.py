@@ -77,3 +77,68 @@ def test_a_cut_to_another_place_is_no_moving_camera(room):
     assert footage.check(np.concatenate([title, film]), cuts=(12,)) == []
     with pytest.raises(Unusable, match="the camera moves"):
         footage.check(np.concatenate([title, film]))
+
+
+def moving(*boxes):
+    """A mask (84, 84) in which rectangles (x, y, width, height) move."""
+    mask = np.zeros((84, 84), bool)
+    for x, y, width, height in boxes:
+        mask[y : y + height, x : x + width] = True
+    return mask
+
+
+LEFT = (0, 30, 20, 12)
+
+
+@pytest.mark.parametrize(
+    ("other", "two"),
+    [
+        ((64, 30, 20, 12), True),
+        ((30, 0, 20, 30), False),  # 10 pixels apart: less than 0.15 of the width
+        ((34, 0, 20, 30), True),  # over the upper edge, 14 apart
+        ((40, 30, 20, 12), False),  # over no edge: an object
+        ((59, 30, 20, 12), False),  # 5 pixels from the edge
+        ((60, 30, 20, 12), True),  # 4, a gap that is closed
+        ((80, 10, 4, 4), False),  # too small for an arm
+        ((0, 60, 20, 12), False),  # below the first: as an arm and its sleeve
+    ],
+)
+def test_two_arms_come_in_over_the_edge_one_beside_the_other(other, two):
+    assert footage._two_arms(moving(LEFT, other)) == two
+    assert not footage._two_arms(moving(other))
+
+
+def test_an_arm_in_pieces_is_one():
+    """Gaps of up to eight pixels are closed."""
+    pieces = [(x, 30, 6, 12) for x in range(0, 84, 13)]
+    assert not footage._two_arms(moving(*pieces))
+
+
+@pytest.mark.parametrize(
+    ("steady", "said"), [(0.9, []), (0.85, ["The camera seems to move a little"]), (0.7, None)]
+)
+def test_a_camera_that_moves_a_little_is_warned_of_and_more_is_refused(
+    room, steady, said, monkeypatch
+):
+    monkeypatch.setattr(footage, "steadiness", lambda still, background: steady)
+    if said is None:
+        with pytest.raises(Unusable, match="the camera moves"):
+            footage.check(arms(room, "left"))
+    else:
+        notes = footage.check(arms(room, "left"))
+        assert [note.partition(";")[0] for note in notes] == said
+
+
+@pytest.mark.parametrize(("share", "two"), [(0.15, False), (0.25, True)])
+def test_two_arms_in_a_fifth_of_the_frames_are_two_people(room, share, two, monkeypatch):
+    asked = iter(np.arange(1000) % 100 < 100 * share)
+    monkeypatch.setattr(footage, "_two_arms", lambda step: next(asked))
+    film = arms(room, "left", frames=60)
+    still = np.zeros((103, 84, 84), np.float32)  # a hundred steps of three frames
+    monkeypatch.setattr(footage, "before_background", lambda frames: (still, still[0], True))
+    monkeypatch.setattr(footage, "steadiness", lambda *_: 1.0)
+    if two:
+        with pytest.raises(Unusable, match="several people"):
+            footage.check(film)
+    else:
+        assert footage.check(film) == []

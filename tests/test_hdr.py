@@ -48,6 +48,33 @@ def test_shadows_stay_and_highlights_roll_off_to_the_peak():
     assert grey[3] == 227 and grey[-1] == 255 and (np.diff(grey.astype(int)) > 0).all()
 
 
+def test_the_screens_gamma_is_that_of_luminance():
+    """HLG red, full signal: 10 E Y^0.2, Y = 0.2627, in BT.709's primaries, none below 0."""
+    red = np.array([[65535, 0, 0]], np.uint16)
+    light = 10 * 0.2627**0.2
+    wanted = np.clip(light * hdr.TO_BT709[:, 0], 0, None)
+    assert hdr.screen_light(red, hdr.HLG)[0] == pytest.approx(wanted, rel=1e-4)
+    blue = np.array([[0, 0, 65535]], np.uint16)
+    light = 10 * 0.0593**0.2
+    assert hdr.screen_light(blue, hdr.HLG)[0, 2] == pytest.approx(1.1187 * light, rel=1e-4)
+
+
+def test_white_is_what_99_of_100_pixels_stay_below():
+    light = np.full((10, 100, 3), 0.5)
+    light.reshape(-1, 3)[:5] = 9  # a lamp
+    assert hdr.white_of(light) == 1.0
+    light.reshape(-1, 3)[:20, 1] = 1.7  # a sheet of paper; the brightest colour counts
+    assert hdr.white_of(light) == pytest.approx(1.7)
+    light[:] = 9
+    assert hdr.white_of(light) == 2.03
+
+
+def test_light_is_counted_from_white():
+    """Paper at twice white is shown as paper at white is, but for the peak it rolls off to."""
+    light = np.full((1, 3), 0.4, np.float32)
+    assert hdr.tone_map(2 * light, 2.0).tolist() == hdr.tone_map(light, 1.0).tolist()
+
+
 def test_hue_stays_where_it_is_too_bright():
     (r, g, b), = hdr.tone_map(np.array([[8.0, 4.0, 0.0]], np.float32), 1.0)  # fmt: skip
     assert r > 240 and b == 0

@@ -60,3 +60,22 @@ def test_the_same_seed_gives_the_same_clip(clip):
     again, other = look_alike(*film()), look_alike(*film(), seed=1)
     assert all((a == b).all() for a, b in zip(clip, again, strict=True))
     assert len(other.times) != len(clip.times) or (other.times != clip.times).any()
+
+
+def test_it_is_slower_after_a_rest_and_lasts_as_long_as_that_takes(clip):
+    """50 frames at 25 a second and at 0.7 times the speed, after 0.4 s: 3.26 s, 15 a second."""
+    assert clip.times[-1] == pytest.approx(0.4 + 2 / 0.7, abs=0.01)
+    assert np.median(np.diff(clip.times)) == pytest.approx(1 / 15, rel=0.25)
+    rest = clip.object[clip.times < 0.4]
+    assert len(rest) > 2 and np.ptp(rest, axis=0).max() == 0
+    assert 0.8 < len(clip.frames) / (15 * clip.times[-1]) < 1  # a tenth never came
+
+
+def test_it_is_warmer_noisy_and_flickers(clip):
+    """Grey of 90 in its corner: red above blue, four grey levels of noise, 3 % of flicker."""
+    corner = clip.frames[:, :40, :40].astype(float)
+    red, green, blue = corner.mean((0, 1, 2))
+    assert red / green == pytest.approx(1.06, abs=0.01)
+    assert blue / green == pytest.approx(0.9, abs=0.01)
+    assert corner.std((1, 2)).mean() == pytest.approx(4, abs=0.3)
+    assert 0.015 < (corner.mean((1, 2, 3)) / corner.mean()).std() < 0.05
