@@ -108,6 +108,40 @@ def test_the_clip_of_the_recipe_bounds_the_reward():
     assert reward == 1.0 and info["reward_parts"]["logit"] > 5
 
 
+def test_each_stage_of_a_rival_takes_the_recipes_numbers(tmp_path, monkeypatch):
+    given = {}
+
+    def trains(name, result):
+        return lambda *a, **k: given.update({name: (a, k)}) or (result, [])
+
+    model = classifier.GoalClassifier()
+    monkeypatch.setattr(cyclegan, "train", trains("G", cyclegan.CycleGAN(2, 1)))
+    monkeypatch.setattr(classifier, "train", trains("D", model))
+    monkeypatch.setattr(sac_ae, "train", trains("policy", "agent"))
+    monkeypatch.setattr(sac_ae, "save", lambda path, agent: path.write_text(agent))
+    monkeypatch.setattr(sac_ae, "load", lambda path: path.read_text())
+    recipe = Recipe(
+        human_frames=0, robot_frames=0, munit_iterations=11, munit_width=12, motion=True,
+        classifier_iterations=13, policy_steps=14, pixel_updates=15, hold=16, entropy=-1.75,
+        clip=3.0, random_negatives=False,
+    )  # fmt: skip
+    experts = [film(20, 60), film(30, 61), film(25, 62)]
+    run = run_in(tmp_path)
+    policy, env = rivals.avid_m(reach(), experts, film(6), film(8), recipe, run=run, **ARGS)
+    assert policy == "agent" and env.get_wrapper_attr("classifier_reward").clip == 3.0
+    options = {name: given[name][1] for name in given}
+    for name, asked in {
+        "G": {"iterations": 11, "width": 12, "motion": True, "seed": 0},
+        "D": {"iterations": 13, "seed": 0},
+        "policy": {"steps": 14, "updates": 15, "hold": 16, "entropy": -1.75, "seed": 0},
+    }.items():
+        assert asked == {field: options[name][field] for field in asked}
+    positive, negative = given["D"][0]
+    # The last tenths, 2, 3 and 3 frames; of no random motion any negative.
+    assert (len(positive), len(negative)) == (8, 18 + 27 + 22)
+    assert classifier.load(tmp_path / "classifier.safetensors").longest == 30
+
+
 @pytest.mark.parametrize("method", ["classifier", "avid"])
 def test_a_rivals_run_ends_with_a_page_and_is_replayed(method, tmp_path, capfd, monkeypatch):
     monkeypatch.setattr(tasks, "ROBOT_EXPERTS", 2)
