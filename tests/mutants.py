@@ -58,7 +58,17 @@ LEFT_OUT = {
 }
 COPIED = ("lbw_minimal", "tasks", "tests", "solutions", "notebooks", "pyproject.toml", "README.md")
 TASKS = ("reach", "push", "slide", "coffee", "drawer")
-WORLD = ("recordings", "arm", "tasks", "scenes", "limits", "viewer", "reenact", "keypoint_env")
+WORLD = (
+    "recordings",
+    "arm",
+    "starts",
+    "tasks",
+    "scenes",
+    "limits",
+    "viewer",
+    "reenact",
+    "keypoint_env",
+)
 
 
 class Ours(Operator):

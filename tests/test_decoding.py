@@ -2,13 +2,16 @@
 
 import os
 import time
+from types import SimpleNamespace
 
 import av
+import numpy as np
 import pytest
 from PIL import Image
-from toy_clips import add, add_sound, encode, reach, room
+from toy_clips import H, W, add, add_sound, encode, reach, room
 
-from lbw_minimal.clips.decoding import look
+from lbw_minimal.clips import decoding
+from lbw_minimal.clips.decoding import Decoder, look
 from lbw_minimal.clips.reader import read_clip
 from lbw_minimal.training import InputError
 
@@ -196,3 +199,75 @@ def test_recordings_put_one_after_another_go_on(tmp_path):
     clip = read_clip(tmp_path / "a.ts")
     assert len(clip.frames) >= 118 and clip.times[-1] == pytest.approx(4.8, abs=0.2)
     assert clip.cuts == [60]
+
+
+def decoded(path, **options):
+    """The stream of a file as its header describes it, a decoder that has read it, and times."""
+    (stream, *_), _ = look(path)
+    decoder = Decoder(path, stream, **options)
+    return stream, decoder, [time for time, _ in decoder]
+
+
+def test_the_header_is_told_in_pixels_rates_and_seconds(tmp_path):
+    path = encode(tmp_path / "a.mp4", reach(45), rate=30)
+    stream, decoder, times = decoded(path)
+    assert (stream.width, stream.height, stream.pixel) == (W, H, 1.0)
+    assert (stream.rate, stream.seconds) == (pytest.approx(30), pytest.approx(1.5))
+    assert (len(times), decoder.packets, decoder.bad, decoder.interlaced) == (45, 45, 0, False)
+    # The last frame lasts, too.
+    assert decoder.covered == pytest.approx(1.5, abs=0.01) == decoder.promised
+
+
+@pytest.mark.parametrize(("stated", "taken"), [(2, 2.0), (4.8, 4.8), (6, 1.0), (0.1, 1.0)])
+def test_a_shape_of_pixels_that_no_camera_has_is_a_mistake(stated, taken):
+    stream = SimpleNamespace(
+        sample_aspect_ratio=stated, average_rate=None, guessed_rate=None, duration=None, index=1,
+        codec_context=SimpleNamespace(width=8, height=6),
+    )  # fmt: skip
+    told = decoding._describe(stream, 7.0)
+    assert (told.pixel, told.rate, told.seconds, told.index) == (taken, 25.0, 7.0, 1)
+
+
+def test_times_count_from_the_streams_own_start(tmp_path):
+    """A transport stream begins at 1.4 s, a camera's after its preview."""
+    _, decoder, times = decoded(encode(tmp_path / "a.ts", reach(30), "mpeg2video"))
+    assert times[:3] == pytest.approx([0, 0.04, 0.08], abs=1e-3)
+    assert decoder.covered == pytest.approx(1.2, abs=0.05)
+
+
+def test_a_glance_takes_key_frames_a_second_apart(tmp_path):
+    """There is one every 0.48 s, so every third is taken."""
+    path = encode(tmp_path / "a.mp4", reach(100), options={"g": "12", "sc_threshold": "0"})
+    _, _, times = decoded(path, sparse=True)
+    assert times == pytest.approx([0, 1.44, 2.88], abs=1e-3)
+
+
+def test_a_start_is_looked_for_from_the_key_frame_before_it(tmp_path):
+    path = encode(tmp_path / "a.mp4", reach(100), options={"g": "12", "sc_threshold": "0"})
+    _, _, times = decoded(path, start=2.0)
+    assert 1.3 < times[0] <= 2.0 and times[-1] == pytest.approx(3.96, abs=1e-3)
+
+
+def test_no_frame_of_an_interlaced_film_is_lost(tmp_path):
+    options = {"flags": "+ildct+ilme", "b": "4M"}
+    path = encode(tmp_path / "a.mpg", reach(20), "mpeg2video", options=options)
+    _, decoder, times = decoded(path)
+    assert decoder.interlaced and len(times) == 20 and (np.diff(times) > 0).all()
+
+
+def test_the_outermost_boxes_of_an_mp4_are_found_by_their_sizes(tmp_path):
+    """A size of 1 says that it stands behind the name, in eight bytes."""
+    path = tmp_path / "a.mp4"
+    small, large = (16).to_bytes(4, "big") + b"ftyp" + 8 * b"x", (24).to_bytes(8, "big")
+    wide = (1).to_bytes(4, "big") + b"mdat" + large + 8 * b"y"
+    path.write_bytes(small + wide + small[:4] + b"moov" + 8 * b"z")
+    assert decoding._boxes(path) == {b"ftyp", b"mdat", b"moov"}
+    path.write_bytes(small + small[:4] + b"?" * 12)
+    assert decoding._boxes(path) == {b"ftyp"}
+
+
+def test_text_in_either_alphabet_is_text_and_noise_is_none():
+    words = "The arm pushes a cube along the table.\n" * 20
+    assert decoding._is_text(words.encode()) and decoding._is_text(words.encode("utf-16"))
+    noise = np.random.default_rng(0).integers(0, 256, 800, np.uint8).tobytes()
+    assert not decoding._is_text(noise)
