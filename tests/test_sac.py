@@ -11,7 +11,7 @@ from lbw_minimal import sac as module
 from lbw_minimal.replay import ReplayBuffer
 from lbw_minimal.sac import SAC, best_actor, train
 from lbw_minimal.sac_networks import Actor, TwinCritic
-from lbw_minimal.training import Checkpoint, InputError, save_state
+from lbw_minimal.training import Checkpoint, InputError, load_state, save_state
 
 
 class Walk(gym.Env):
@@ -356,6 +356,32 @@ def test_a_full_buffer_forgets_the_oldest():
     for i in range(5):
         buffer.add(obs=i, action=0, reward=i, next_obs=i, terminal=0)
     assert sorted(buffer.data["reward"]) == [2, 3, 4] and len(buffer) == 3
+
+
+def numbered(capacity, n):
+    buffer = ReplayBuffer(1, 1, capacity)
+    for i in range(1, n + 1):
+        buffer.add(obs=i, action=i / 10, reward=i, next_obs=i + 1, terminal=i % 2)
+    return buffer
+
+
+def test_a_buffer_gives_what_it_has_and_each_transition_whole():
+    batch = numbered(100, 3).sample(np.random.default_rng(0), 60)
+    reward = batch["reward"]
+    assert set(reward.tolist()) == {1, 2, 3}
+    assert torch.equal(batch["obs"][:, 0], reward) and torch.equal(batch["terminal"], reward % 2)
+    assert torch.equal(batch["next_obs"][:, 0], reward + 1)
+    torch.testing.assert_close(batch["action"][:, 0], reward / 10)
+
+
+def test_a_full_buffer_comes_back_and_forgets_the_oldest_next(tmp_path):
+    buffer, again = numbered(3, 4), ReplayBuffer(1, 1, 3)
+    save_state(tmp_path / "state", buffer.state_dict())
+    again.load_state_dict(load_state(tmp_path / "state"))
+    for one in (buffer, again):
+        assert sorted(one.data["reward"]) == [2, 3, 4] and len(one) == 3
+        one.add(obs=5, action=0, reward=5, next_obs=6, terminal=0)
+        assert sorted(one.data["reward"]) == [3, 4, 5]
 
 
 def test_a_resumed_run_ends_as_the_uninterrupted_one(tmp_path):

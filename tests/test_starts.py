@@ -2,12 +2,15 @@
 
 import json
 from itertools import islice
+from types import SimpleNamespace
 
 import gymnasium as gym
 import numpy as np
 import pytest
 
 import tasks
+from lbw_minimal import imitate, video
+from tasks import world
 from tasks.commands.job import fields_of
 from tasks.world import DT, SUBSTEPS, random_actions
 from tasks.world import motion as module
@@ -282,3 +285,25 @@ def test_the_recipe_is_that_of_the_results(name):
         ours = fields_of(tasks.module(name).RECIPE, "lbw")
         known = {key: value for key, value in settings["recipe"].items() if key in ours}
         assert known == {key: ours[key] for key in known} and len(known) > 8
+
+
+def test_the_shipped_perception_has_watched_the_first_human_video(monkeypatch):
+    watched = []
+    perception = SimpleNamespace(watch=watched.append)
+    monkeypatch.setattr(imitate, "load_perception", lambda *where: (where, perception)[1])
+    monkeypatch.setattr(video, "read", lambda path: (path.relative_to(tasks.VIDEOS), []))
+    assert tasks.trained_perception("slide") is perception
+    assert [path.as_posix() for path in watched] == ["slide/expert_01.mp4"]
+
+
+def test_the_film_of_the_robots_pace_has_its_own_seed_and_400_frames(monkeypatch):
+    asked = []
+
+    def record(env, frames, seed):
+        asked.append((env.embodiment, frames, seed))
+        return np.zeros(1), None
+
+    monkeypatch.setattr(world, "record_random", record)
+    tasks.pace_film("reach", 9001)
+    tasks.pace_film("reach", 9002, 7)
+    assert asked == [("robot", 400, 9001), ("robot", 7, 9002)]
