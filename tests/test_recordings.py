@@ -106,6 +106,25 @@ def test_a_recording_is_what_the_environment_said():
     env.close()
 
 
+def test_what_is_kept_of_an_action_is_what_was_played_whatever_becomes_of_it():
+    """A policy may give the same array again and again, in double precision."""
+    env = tasks.bare("reach", observation="state")
+    action, one_third = np.zeros(3), 1 / 3
+
+    def changing():
+        for x in (one_third, -1.0):
+            action[0] = x
+            yield action
+
+    played, step = [], env.step
+    env.step = lambda a: played.append(a.copy()) or step(a)
+    *_, recording = film(env, 0, changing())
+    assert recording.actions.dtype == np.float32
+    np.testing.assert_array_equal(recording.actions[:, 0], np.float32([one_third, -1]))
+    np.testing.assert_array_equal(recording.actions, played)
+    env.close()
+
+
 def test_the_same_recordings_make_the_same_file(tmp_path):
     env = tasks.bare("reach", observation="state")
     for name in ("a", "b"):
