@@ -52,6 +52,7 @@ LEARNS = {  # the stages in which something is learnt; the others film
     "lbw": ("translation", "keypoints", "policy"),
     "avid": ("translation", "classifier", "policy"),
     "classifier": ("classifier", "policy"),
+    "tracks": ("policy",),
 }
 EPISODE_TITLE = "What the robot does now"
 MACHINE = (
@@ -104,14 +105,17 @@ def write_report(
     settings = metrics.get("settings", {})
     method = settings.get("method", "lbw")
     form = settings.get("reward", "mended") if method == "lbw" else "classifier"
-    kind = "lbw" if method == "lbw" else "rival"
+    kind = method if method in ("lbw", "tracks") else "rival"
+    form = "object tracks'" if kind == "tracks" else form
     page = [headline(task, metrics, method)]
     if translated is not None and z_demo is not None and "frames" in episode:
         page.append(_method(demo, translated, z_demo, episode))
     columns = demonstration(demo, translated, z_demo, fps, logits)
     page += section(SHOWN[method], DEMONSTRATION[method], columns)
     if "frames" in episode:
-        page += _test_episode(demo, translated, z_demo, episode, metrics.get("episodes", []), fps)
+        page += _test_episode(
+            demo, translated, z_demo, episode, metrics.get("episodes", []), fps, kind
+        )
     if scene_html:
         frame = f'<iframe title="The episode in 3-D" srcdoc="{escape(scene_html)}"></iframe>'
         page += section("The same episode in three dimensions", SCENE, frame, kind="scene")
@@ -143,14 +147,14 @@ def _method(demo, translated, z_demo, episode):
     return picture(svg(figure), METHOD)
 
 
-def _test_episode(demo, translated, z_demo, episode, episodes, fps):
+def _test_episode(demo, translated, z_demo, episode, episodes, fps, kind):
     """The film of a test episode, how all of them ended, and its keypoints beside the video's."""
     frames = episode["frames"]
     marks = " ".join("✓" if row["success"] else "✗" for row in episodes)
     marks = f'<p class="small">All test episodes, this one first: {marks}</p>' if marks else ""
     if z_demo is None:
         shown = Film({"the robot, in a test episode": frames}, fps / 2).html()
-        return section(EPISODE_TITLE, EPISODE["rival"], shown, marks)
+        return section(EPISODE_TITLE, EPISODE[kind], shown, marks)
     z = _keypoints(episode, z_demo.shape[1])
     films = {"the human": demo}
     if translated is not None:

@@ -96,6 +96,18 @@ higher its <b>reward</b>. It sees whole pictures, no keypoints.</li>
 <p>No action was recorded. Nothing is translated either: this rival needs a robot that can do the
 task already.</p>
 """,
+    "tracks": """
+<p>After the paper: track, do not translate. A human arm did the task once, in front of a
+camera:</p>
+<ol>
+<li>The <b>object</b> is found in that video: the points that rest first, move later, and move
+together. No network is trained for it.</li>
+<li>The robot finds the object in its own picture by its looks and <b>tracks</b> it.</li>
+<li>The robot tries, over and over. The nearer its object keeps to how the human's moved, the higher
+its <b>reward</b>. How the arm does that is left to it.</li>
+</ol>
+<p>No action of the human was recorded, and nobody told the robot what success is.</p>
+""",
 }
 
 METHOD = (
@@ -108,11 +120,13 @@ VIDEOS = {  # what each method learns from
     "lbw": "one video",
     "avid": "15 videos of a human",
     "classifier": "35 videos of itself",
+    "tracks": "how an object moved",
 }
 SHOWN = {
     "lbw": "What the human showed, and what the robot saw in it",
     "avid": "What the human showed, and what the classifier was shown",
     "classifier": "What the classifier was shown",
+    "tracks": "What the human showed, and the object in it",
 }
 
 DEMONSTRATION = {
@@ -131,6 +145,10 @@ the object still there, and is the arm where it should be?</p>
 <p>The first video of the robot, from left to right, and how likely the goal classifier takes each
 moment for an end (a logit: above 0 it says yes).</p>
 """,
+    "tracks": """
+<p>The human video, from left to right. Yellow pixels are the points that were found to be the
+object's. Each should stay where it is on the object.</p>
+""",
 }
 
 EPISODE = {
@@ -142,6 +160,10 @@ a long video is sped up, and a fast one slowed down.</p>
     "rival": """
 <p>The first test episode at half speed, as the robot's camera sees it. It knows the last three of
 these pictures, and nothing else of the scene.</p>
+""",
+    "tracks": """
+<p>The first test episode at half speed, as the robot's camera sees it. It knows how far the object
+has moved, and where the nearest of its arm is, seen from the object.</p>
 """,
 }
 
@@ -171,6 +193,12 @@ actions. Look for the blue line of the upper picture to climb towards 1. If the 
 the upper does not, the robot has found pictures that please the classifier and do not show the
 task. Success is only counted here; it is no part of the reward.</p>
 """,
+    "tracks": """
+<p>Each grey dot is one attempt of the robot while it was learning, with some chance in its
+actions. Look for the blue line of the upper picture to climb towards 1. In the lower picture, a
+return nearer to 0 moves the object more as the human did. Success is only counted here; it is no
+part of the reward.</p>
+""",
 }
 
 REWARD = {
@@ -183,6 +211,11 @@ back to it, until the end.</p>
     "rival": """
 <p>The goal classifier's logit of the robot's picture at each step of the test episode. The reward
 is that, divided by the recipe's clip.</p>
+""",
+    "tracks": """
+<p>The three parts of what the robot earned at each step of the test episode: r1 for an object that
+is where the human's was, r2 for one that moves as it did, r3 for an arm that is at the object while
+there is a way to go. In the sum r2 counts three times. All are at most 0.</p>
 """,
 }
 

@@ -19,7 +19,7 @@ import numpy as np
 import torch
 
 import tasks
-from lbw_minimal import __version__, classifier, cyclegan, sac, sac_ae, video
+from lbw_minimal import __version__, classifier, cyclegan, sac, sac_ae, tracks, video
 from lbw_minimal.imitate import Perception, Recipe, Run, load_perception
 from lbw_minimal.reward import MENDS
 from lbw_minimal.training import InputError, pick_device, write_atomic
@@ -50,12 +50,14 @@ FAST = {
 FAST_PIXELS = {"policy_steps": 530}  # few updates, each of which takes ten of LbW's
 TRANSLATION = ("robot_frames", "munit_iterations", "munit_width")
 PERCEPTION = (*TRANSLATION, "transporter_iterations", "K", "shift", "hue")
-# Fields that only the rivals have.
+PIXELS = ("avid", "classifier")  # the rivals, who learn from pixels
+# Fields that only they have.
 RIVALS = ("classifier_iterations", "random_negatives", "clip", "pixel_updates", "hold")
 METHODS = {  # and the fields of the recipe that each of them has
     "lbw": ("human_frames", *PERCEPTION, "policy_steps", "updates", "entropy"),
     "avid": ("human_frames", *TRANSLATION, "motion", *RIVALS, "policy_steps", "entropy"),
     "classifier": (*RIVALS, "policy_steps", "entropy"),
+    "tracks": ("policy_steps", "updates", "entropy"),
 }
 
 
@@ -67,7 +69,7 @@ def parser(name: str) -> Parser:
         "--method",
         choices=tuple(METHODS),
         default="lbw",
-        help="avid, classifier: the paper's rivals",
+        help="avid, classifier: the paper's rivals; tracks: after the paper",
     )
     add("--video", type=Path, metavar="FILE", help="a clip of your own arm; see prepare")
     add(
@@ -120,7 +122,9 @@ def check(name: str, args: argparse.Namespace, argv: list[str]) -> Job:
     from_scratch = lbw and (args.from_scratch or args.fast or args.translate_clip)
     refuse_idle_options(args, from_scratch)
     module = tasks.module(name)
-    fast = FAST if lbw else FAST | FAST_PIXELS
+    if args.method == "tracks" and getattr(module, name.capitalize()).CONTACT is None:
+        raise InputError(f"{name}: --method tracks follows an object, and here none is moved.")
+    fast = FAST | FAST_PIXELS if args.method in PIXELS else FAST
     recipe = dataclasses.replace(module.RECIPE, **fast) if args.fast else module.RECIPE
     recipe = dataclasses.replace(recipe, **read_settings(args, from_scratch))
     pick_device(args.device or "cpu")
@@ -128,6 +132,8 @@ def check(name: str, args: argparse.Namespace, argv: list[str]) -> Job:
 
     clip = usable(name, args.video) if args.video and not args.translate_clip else None
     experts = [clip.film] if clip else [read_video(path) for path in videos(name, args)]
+    if args.method == "tracks":
+        tracks.watch(experts[0])  # raises InputError if it moves no object
     learns = from_scratch or (args.method == "avid" and not args.evaluate)
     random = np.empty((0, video.SIZE, video.SIZE, 3), np.uint8)
     # It takes seconds to read. A clip that is translated is the human domain alone.
@@ -185,8 +191,8 @@ def videos(name: str, args: argparse.Namespace) -> list[Path]:
         return [args.video]
     if args.videos and args.videos > EXPERTS:
         raise InputError(f"--videos {args.videos}: {name} has {EXPERTS} human videos.")
-    usual = {"lbw": 1, "avid": EXPERTS, "classifier": 0}  # the last one films the robot
-    count = args.videos or usual[args.method]
+    usual = {"avid": EXPERTS, "classifier": 0}  # the last one films the robot
+    count = args.videos or usual.get(args.method, 1)
     return [tasks.VIDEOS / name / f"expert_{i + 1:02d}.mp4" for i in range(count)]
 
 
@@ -200,7 +206,7 @@ def read_video(path: Path, whole: bool = False) -> np.ndarray:
 
 def check_weights(weights: Path, name: str, method: str) -> None:
     """Raise InputError unless the folder `weights` holds what a replay of the method takes."""
-    if method == "lbw":
+    if method not in PIXELS:
         sac.load(weights / "policy.safetensors")
         return
     sac_ae.load(weights / "policy.safetensors")
@@ -220,6 +226,9 @@ def refuse_idle_options(args: argparse.Namespace, from_scratch: bool) -> None:
     if args.method == "lbw" and args.videos and args.videos > 1 and not args.from_scratch:
         why = "only a translation that is trained sees more than one; add --from-scratch"
         idle += [("--videos", args.videos, why)]
+    if args.method == "tracks":
+        idle += [("--videos", args.videos, "object tracks watch one video"),
+                 ("--device", args.device, "so small a policy learns on the CPU")]  # fmt: skip
     if args.method == "classifier":
         idle += [("--videos", args.videos, "the classifier reward films the robot itself")]
     if args.video:
@@ -227,15 +236,17 @@ def refuse_idle_options(args: argparse.Namespace, from_scratch: bool) -> None:
     else:
         idle += [("--translate-clip", args.translate_clip, "--video names the clip")]
     if args.method != "lbw":
-        why = f"--method {args.method} has no keypoints and learns its reward anew"
+        why = f"--method {args.method} has no keypoints and a reward of its own"
         idle += [("--from-scratch", args.from_scratch, why), ("--without", args.without, why),
                  ("--reward", args.reward if args.reward != "mended" else None, why)]  # fmt: skip
-        idle += [("--video", args.video, "the rivals learn from many videos")]
+        many = args.video if args.method in PIXELS else None
+        idle += [("--video", many, "the rivals learn from many videos"),
+                 ("--translate-clip", args.translate_clip, "nothing is translated")]  # fmt: skip
         if not args.evaluate:
-            why = "the classifier reward trains all of its networks anew"
-            idle += [("--weights", args.weights if args.method == "classifier" else None, why)]
+            why = f"--method {args.method} trains all of its networks anew"
+            idle += [("--weights", args.weights if args.method != "avid" else None, why)]
         elif args.weights is None:
-            raise InputError("--evaluate: the kit has no rival's policy; name a run by --weights.")
+            raise InputError("--evaluate: the kit has no such policy; name a run by --weights.")
     elif args.reward == "literal":
         idle += [("--without", args.without, "the literal reward has no mends")]
     if from_scratch:

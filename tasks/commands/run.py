@@ -18,7 +18,8 @@ import torch
 from gymnasium.spaces import Box
 
 import tasks
-from lbw_minimal import classifier, cyclegan, rivals, sac
+from lbw_minimal import classifier, cyclegan, rivals, sac, tracks
+from lbw_minimal.follow import follow
 from lbw_minimal.imitate import PACE, Perception, imitate, learn_perception
 from lbw_minimal.report import wilson, write_report
 from lbw_minimal.training import InputError, counted, peak_memory, seed_everything
@@ -38,6 +39,8 @@ def main(name: str, argv: list[str]) -> None:
         perception, robot = perceive(job)
         agent, env = learn(job, perception, robot)
         seen = {"demo": job.demo, "translated": perception.translated, "z_demo": perception.z_E}
+    elif job.args.method == "tracks":
+        agent, env, seen = track(job)
     else:
         agent, env, seen = rival(job)
     first, scene = test(job, agent, env)
@@ -123,11 +126,28 @@ def learn(job: Job, perception: Perception, robot: np.ndarray) -> tuple[sac.Poli
         job.demo, robot, perception, job.recipe,
         seed=job.args.seed, run=job.run, form=job.args.reward, without=job.args.without,
     )  # fmt: skip
+    refuse_strangers(job, agent, env, "--reward")
+    return agent, env
+
+
+def track(job: Job) -> tuple[sac.Policy, gym.Env, dict[str, Any]]:
+    """The policy by object tracks, its environment, and the tracked video for the report."""
+    torch.set_num_threads(1)
+    robot = film_robot(job, PACE)
+    if job.args.evaluate:
+        bring(job, "policy")
+    env: gym.Env = gym.make(tasks.id_of(job.name), jitter=job.args.jitter)
+    agent, env = follow(env, job.demo, robot, job.recipe, seed=job.args.seed, run=job.run)
+    refuse_strangers(job, agent, env, "--method")
+    return agent, env, {"demo": tracks.draw(job.demo)}
+
+
+def refuse_strangers(job: Job, agent: sac.Policy, env: gym.Env, option: str) -> None:
+    """Raise InputError if the policy was trained to see something else than `env` shows."""
     sees, given = agent.sizes["obs_dim"], cast(Box, env.observation_space).shape[0]
     if sees != given:
-        why = f"that policy sees {sees} numbers, and {given} come with this reward"
-        raise InputError(f"{job.weights}: {why}; give the --reward it was trained with.")
-    return agent, env
+        why = f"that policy sees {sees} numbers, and {given} come with this {option[2:]}"
+        raise InputError(f"{job.weights}: {why}; give the {option} it was trained with.")
 
 
 def test(job: Job, agent: sac.Policy, env: gym.Env) -> tuple[dict[str, Any], str]:
