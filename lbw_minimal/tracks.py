@@ -27,6 +27,7 @@ BACK = 0.5  # pixels that the flow back may miss the point by
 STILL = 1.0  # pixels: less is rest
 GONE = 3.0  # pixels: a point that ends farther from its start has moved
 FIRST = 0.25  # share of the demonstration in which the object still rests
+LEAST = 2  # points that an object has: one alone may be a hand's, and agrees with itself
 TOGETHER = 1.5  # pixels by which two points of one object may differ in their displacement
 CORNER = 0.01  # of the best corner's strength; below that, a corner is noise
 COLOUR = 30  # grey levels between two things, of 255; shading makes less
@@ -85,26 +86,31 @@ def follow(frames: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarr
     return np.stack(paths), kept
 
 
-def together(d: np.ndarray) -> np.ndarray:
-    """The largest group among displacements (T, n, 2) that agree with one of them: (n,) bool."""
+def together(d: np.ndarray, weight: np.ndarray | float = 1.0) -> np.ndarray:
+    """The largest group among displacements (T, n, 2) that agree with one of them: (n,) bool.
+
+    weight (n,): how much each of them counts.
+    """
     if not d.shape[1]:
         return np.zeros(0, bool)
     apart = np.linalg.norm(d[:, :, None] - d[:, None], axis=-1).max(axis=0)  # (n, n)
     alike = apart < TOGETHER
-    return alike[alike.sum(axis=1).argmax()]
+    return alike[(alike * weight).sum(axis=1).argmax()]
 
 
 def object_points(paths: np.ndarray, kept: np.ndarray) -> np.ndarray:
     """Which of the points with paths (T, n, 2) are the object's, (n,) bool.
 
     A hand moves from the start, a table never, a lamp on its own. A thing that is pushed rests
-    first, moves later, and all of its points move alike.
+    first, moves later, and all of its points move alike. Of several groups the one that has come
+    farthest counts, all of its ways together: in front of tiles, an arm that passes by drags
+    corners along for a few pixels.
     """
     d = paths - paths[0]
     far = np.linalg.norm(d, axis=-1)  # (T, n)
     rests = (far[: max(2, round(FIRST * len(far)))] < STILL).all(axis=0)
     moved = kept & rests & (far[-1] > GONE)
-    moved[moved] = together(d[:, moved])
+    moved[moved] = together(d[:, moved], far[-1, moved])
     return moved
 
 
@@ -123,12 +129,12 @@ class Demonstration:
 def watch(demo: np.ndarray) -> Demonstration:
     """Find the object in a demonstration (N, 84, 84, 3) uint8, and how it moves.
 
-    Raises InputError if nothing rests first and moves later.
+    Raises InputError if no two points rest first, move later, and move together.
     """
     points = corners(demo[0])
     paths, kept = follow(demo, points)
     own = object_points(paths, kept)
-    if not own.any():
+    if own.sum() < LEAST:
         raise InputError(
             "no object rests first and moves later in the demonstration; tracks need one."
         )

@@ -388,6 +388,9 @@ STATED = {
     ("9.3", "demo", -1), ("9.3", "robot", -1), ("12.2", "tip", -1),
     *(("12.3", name, -1) for name in ("start", "end", "scene_start", "scene_end")),
     *(("12.4", name, -1) for name in ("path", "start", "end")),
+    *(("13.1", name, -1) for name in ("points", "there", "back")), ("13.2", "paths", -1),
+    *(("13.3", name, -1) for name in ("p_0", "to", "d")),
+    *(("13.4", name, -1) for name in ("d", "d_next", "g_next", "d_E", "lam")),
 }  # fmt: skip
 
 

@@ -1,0 +1,367 @@
+"""Notebook 13, after the paper: there and back, whose points, what is lost, the reward."""
+
+import numpy as np
+
+from tests.grade.exercise import exercise
+
+
+@exercise("13.1", "There and back")
+def there_and_back(points, there, back, most):
+    height, width = there.shape[:2]
+    to = points + there[points[:, 1], points[:, 0]]
+    x, y = np.round(to).astype(int).T
+    inside = (x >= 0) & (x < width) & (y >= 0) & (y < height)
+    home = to + back[y.clip(0, height - 1), x.clip(0, width - 1)]
+    return inside & (np.linalg.norm(home - points, axis=1) < most)
+
+
+def _flows(rng, leaves=0.0):
+    """Points, two flows, and what they may be off; a share of the points `leaves` the picture.
+
+    Half of those that stay come home, half do not. Those that leave would come home by the flow at
+    the picture's rim. Each point misses in x and in y, so that neither alone decides.
+    """
+    size = np.array([rng.integers(20, 30), rng.integers(31, 40)])  # height, width
+    n, most = int(rng.integers(10, 16)), float(rng.uniform(0.3, 1.5))
+    there, back = (rng.normal(0, 3, (*size, 2)) for _ in range(2))
+    grid = np.stack(np.meshgrid(np.arange(4, 16), np.arange(4, 16)), -1).reshape(-1, 2)
+    points = grid[rng.choice(len(grid), n, replace=False)]
+    for k, (x, y) in enumerate(points):
+        way = rng.integers(-3, 4, 2) + rng.uniform(-0.4, 0.4, 2)
+        out = k < leaves * n
+        there[y, x] = (-x - rng.uniform(2, 4), way[1]) if out else way
+        to = points[k] + there[y, x]
+        i, j = np.round(to).astype(int).clip(0)
+        miss = most * (rng.uniform(0.2, 0.6) if out or k % 2 else rng.uniform(1.3, 2))
+        angle = rng.choice([0.25, 0.75, 1.25, 1.75]) * np.pi
+        back[j, i] = points[k] - to + miss * np.array([np.cos(angle), np.sin(angle)])
+    return points, there, back, most
+
+
+there_and_back.check("some come home, some do not", _flows, points=2)
+there_and_back.check("some leave the picture", lambda rng: _flows(rng, 0.5), points=2)
+there_and_back.mistake(
+    "A picture is asked for its row first: flow[y, x]. You ask flow[x, y].",
+    "there[points[:, 1], points[:, 0]]",
+    "there[points[:, 0], points[:, 1]]",
+)
+there_and_back.mistake(
+    "The way back is taken from where the point has come to; you take it from where it began.",
+    "back[y.clip(0, height - 1), x.clip(0, width - 1)]",
+    "back[points[:, 1], points[:, 0]]",
+)
+there_and_back.mistake(
+    "A point that has left the picture is not kept: nobody knows what became of it.",
+    "return inside & (",
+    "return (",
+)
+there_and_back.mistake(
+    "Home is where it came to plus the flow back; you add that flow to where it began.",
+    "home = to + back",
+    "home = points + back",
+)
+there_and_back.mistake(
+    "You keep the points that do not come home.",
+    "axis=1) < most",
+    "axis=1) > most",
+)
+there_and_back.mistake(
+    "That asks how far a point has moved. What counts is by how much it misses its start on the "
+    "way back.",
+    "np.linalg.norm(home - points, axis=1)",
+    "np.linalg.norm(to - points, axis=1)",
+)
+there_and_back.mistake(
+    "`most` is a distance, of x and y together; you look at x alone.",
+    "np.linalg.norm(home - points, axis=1)",
+    "np.abs(home - points)[:, 0]",
+)
+there_and_back.mistake(
+    "A point comes to the pixel nearest to it: round, where you cut the fraction off.",
+    "np.round(to).astype(int)",
+    "to.astype(int)",
+)
+
+
+@exercise("13.2", "Whose points are these?")
+def object_points(paths, kept, still, gone):
+    far = np.linalg.norm(paths - paths[0], axis=2)
+    rests = (far[: len(paths) // 4] < still).all(axis=0)
+    return kept & rests & (far[-1] > gone)
+
+
+def _paths(rng, *kinds):
+    """Paths (T, n, 2), kept, and the two distances, of points of these kinds and of the object."""
+    T = int(rng.integers(12, 30))
+    quarter, still, gone = T // 4, float(rng.uniform(0.5, 1.5)), float(rng.uniform(3, 6))
+    courses = []
+    count = int(rng.integers(3, 6))
+    names = [*(k for k in kinds for _ in range(int(rng.integers(2, 4)))), *["object"] * count]
+    for name in names:
+        start = T // 2 + 1 if name == "late" else quarter + int(rng.integers(0, 2))
+        rise = np.clip((np.arange(T) - start + 1) / (T - start), 0, 1) * gone * rng.uniform(1.5, 3)
+        far = {
+            "hand": np.linspace(0, 4 * gone, T),
+            "table": np.zeros(T),
+            "slow": rise * 0.3,
+            "lamp": gone * 2 * np.sin(np.pi * np.clip(np.arange(T) - quarter, 0, None) / T) ** 2,
+            "flash": np.where(np.arange(T) == quarter - 1, 2 * still, rise),
+        }.get(name, rise)
+        if name == "lamp":
+            far = far * np.append(np.ones(T - 1), 0.2)
+        angle = rng.choice([0.5, 1, 1.5, 2]) * np.pi + rng.uniform(0.2, 0.6)
+        trembles = 0.2 * still * rng.uniform(-1, 1, (T, 2)) / np.sqrt(2)
+        way = far[:, None] * np.array([np.cos(angle), np.sin(angle)]) + trembles
+        courses.append(rng.uniform(20, 60, 2) + way - way[0])
+    order = rng.permutation(len(names))
+    kept = np.array(names) != "lost"
+    return np.stack(courses, 1)[:, order], kept[order], still, gone
+
+
+object_points.check(
+    "a hand, a table and an object", lambda rng: _paths(rng, "hand", "table"), points=2
+)
+object_points.check("points that were lost", lambda rng: _paths(rng, "lost", "table"))
+object_points.check("a lamp that swings back", lambda rng: _paths(rng, "lamp", "hand"))
+object_points.check("points that hardly move", lambda rng: _paths(rng, "slow", "late", "hand"))
+object_points.check(
+    "a twitch at the end of the first quarter", lambda rng: _paths(rng, "flash", "table")
+)
+object_points.mistake(
+    "A point that was lost says nothing about where it went: `kept` has to be True.",
+    "kept & rests",
+    "rests",
+)
+object_points.mistake(
+    "The object rests in EVERY frame of the first quarter: a hand moves from the start, and you "
+    "count its points.",
+    "kept & rests & (far[-1] > gone)",
+    "kept & (far[-1] > gone)",
+)
+object_points.mistake(
+    "The object has to move later: a table rests, too, and you count its points.",
+    "kept & rests & (far[-1] > gone)",
+    "kept & rests",
+)
+object_points.mistake(
+    "You keep no point at all. The object rests in the first quarter alone, and how far it is, is "
+    "measured from its own start, paths[0].",
+    "far[: len(paths) // 4]",
+    "far",
+)
+object_points.mistake(
+    "The first quarter of the frames is asked for; you take the first half.",
+    "len(paths) // 4",
+    "len(paths) // 2",
+)
+object_points.mistake(
+    "What counts is where it ends. You take how far it ever was, and a lamp that swings back is "
+    "in.",
+    "far[-1] > gone",
+    "far.max(axis=0) > gone",
+)
+object_points.mistake(
+    "How far from its start does a point end? You take the last step alone.",
+    "(far[-1] > gone)",
+    "(np.linalg.norm(paths[-1] - paths[-2], axis=1) > gone)",
+)
+object_points.mistake(
+    "x alone does not say how far a point is from its start: take the length of both together.",
+    "np.linalg.norm(paths - paths[0], axis=2)",
+    "np.abs(paths - paths[0])[:, :, 0]",
+)
+object_points.mistake(
+    "`still` and `gone` have changed places.",
+    "< still",
+    "< gone",
+    "> gone",
+    "> still",
+)
+
+
+@exercise("13.3", "Lost and found")
+def lost_and_found(p_0, to, kept, d):
+    if kept.any():
+        d = np.median((to - p_0)[kept], axis=0)
+    return d, np.where(kept[:, None], to, p_0 + d)
+
+
+def _seen(rng, lost, dragged=0):
+    """Where points began, where flow puts them, which were kept, and the last displacement."""
+    n = int(rng.integers(7, 12))
+    p_0, d = rng.uniform(20, 60, (n, 2)), rng.uniform(2, 12, 2) * rng.choice([-1, 1], 2)
+    to = p_0 + d + rng.uniform(0.5, 1.5, 2) + rng.uniform(-0.3, 0.3, (n, 2))
+    order = rng.permutation(n)
+    gone, off = order[:lost], order[lost : lost + dragged]
+    to[gone] += rng.uniform(8, 20, (len(gone), 2)) * rng.choice([-1, 1], (len(gone), 2))
+    to[off] += rng.uniform(5, 9, (len(off), 2))
+    kept = np.ones(n, bool)
+    kept[gone] = False
+    return p_0, to, kept, d
+
+
+lost_and_found.check("some points are lost", lambda rng: _seen(rng, int(rng.integers(2, 5))))
+lost_and_found.check("none is lost", lambda rng: _seen(rng, 0))
+lost_and_found.check("a gripper drags one along", lambda rng: _seen(rng, 3, dragged=1), points=2)
+
+
+def _all_lost(rng):
+    p_0, to, kept, d = _seen(rng, 2)
+    return p_0, to, np.zeros_like(kept), d
+
+
+lost_and_found.check("all are lost", _all_lost)
+lost_and_found.mistake(
+    "A gripper that drags one point along moves the mean. The median does not mind one of many.",
+    "np.median",
+    "np.mean",
+)
+lost_and_found.mistake(
+    "Points that were lost have no say in the displacement: take the kept ones alone.",
+    "(to - p_0)[kept]",
+    "(to - p_0)",
+)
+lost_and_found.mistake(
+    "Where flow puts a lost point is wrong. Put it where the kept ones say that it must be.",
+    "np.where(kept[:, None], to, p_0 + d)",
+    "to",
+)
+lost_and_found.mistake(
+    "A lost point does not wait at its start, p_0, but where the object has gone: p_0 + d.",
+    "np.where(kept[:, None], to, p_0 + d)",
+    "np.where(kept[:, None], to, p_0)",
+)
+lost_and_found.mistake(
+    "A kept point stays where flow has found it; you move it onto the median.",
+    "np.where(kept[:, None], to, p_0 + d)",
+    "p_0 + d",
+)
+lost_and_found.mistake(
+    "With no point kept there is no median. The object is where it was last: d.",
+    "    if kept.any():\n        d = np.median((to - p_0)[kept], axis=0)\n",
+    "    d = np.median((to - p_0)[kept], axis=0)\n",
+)
+lost_and_found.mistake(
+    "A displacement is a place now minus a place at the start; you take the places themselves.",
+    "(to - p_0)[kept]",
+    "to[kept]",
+)
+lost_and_found.mistake(
+    "Lost points wait at the new displacement; you put them at the one before.",
+    "    if kept.any():\n        d = np.median((to - p_0)[kept], axis=0)\n"
+    "    return d, np.where(kept[:, None], to, p_0 + d)",
+    "    new = np.median((to - p_0)[kept], axis=0) if kept.any() else d\n"
+    "    return new, np.where(kept[:, None], to, p_0 + d)",
+)
+lost_and_found.mistake(
+    "x and y have a median each: over the points, axis 0.",
+    "axis=0",
+    "axis=None",
+)
+
+
+@exercise("13.4", "What the object is paid for")
+def reward(d, d_next, g_next, d_E, t, lam):
+    def length(x):
+        return min(np.linalg.norm(x), 2 * L) / L
+
+    L = np.linalg.norm(d_E, axis=1).max()
+    last = len(d_E) - 1
+    now, goal = d_E[min(t, last)], d_E[min(t + 1, last)]
+    r1 = -length(d_next - goal)
+    r2 = -length(d_next - d - (goal - now))
+    r3 = -(1 - np.linalg.norm(goal) / L) * length(g_next)
+    return lam[0] * r1 + lam[1] * r2 + lam[2] * r3
+
+
+def _step(rng, at=None, far=0.0, swings=False):
+    """A step of an episode. at: the share of the demonstration that has passed; far: how far the
+    object was thrown and the arm is, in demonstrations; swings: it ends before its farthest."""
+    N = int(rng.integers(9, 20))
+    way = rng.uniform(10, 40) * np.array([np.cos(a := rng.uniform(0, 6.28)), np.sin(a)])
+    share = np.concatenate([np.zeros(3), np.cumsum(rng.uniform(0.5, 1, N - 3))])
+    d_E = (share / share[-1])[:, None] * way + rng.uniform(-0.3, 0.3, (N, 2))
+    d_E[0] = 0
+    if swings:
+        d_E[-1] *= 0.6
+    t = int(rng.integers(2, N - 2)) if at is None else N - 1 + int(rng.integers(0, 4))
+    L = np.linalg.norm(way)
+    d = d_E[min(t, N - 1)] + rng.uniform(-0.4, 0.4, 2) * L
+    d_next = d + rng.uniform(-0.2, 0.2, 2) * L + far * way
+    g_next = rng.uniform(0.1, 0.5, 2) * rng.choice([-1, 1], 2) * L * (1 + 6 * far)
+    return d, d_next, g_next, d_E, t, rng.uniform(0.5, 3, 3)
+
+
+reward.check("a step on the way", _step, points=2)
+reward.check("the demonstration is over", lambda rng: _step(rng, at=1.0, swings=True))
+reward.check("an object that was thrown far away", lambda rng: _step(rng, far=3.0))
+reward.mistake(
+    "r1 judges where the step has led: d_next, where you take d.",
+    "-length(d_next - goal)",
+    "-length(d - goal)",
+)
+reward.mistake(
+    "The step t leads to the demonstration's frame t + 1; you compare with frame t.",
+    "r1 = -length(d_next - goal)",
+    "r1 = -length(d_next - now)",
+)
+reward.mistake(
+    "An object that is thrown away costs at most 2 a part: cap the length at twice L.",
+    "min(np.linalg.norm(x), 2 * L) / L",
+    "np.linalg.norm(x) / L",
+)
+reward.mistake(
+    "Those are pixels. A length is divided by L, or a long way pays less than a short one.",
+    "min(np.linalg.norm(x), 2 * L) / L",
+    "min(np.linalg.norm(x), 2 * L)",
+)
+reward.mistake(
+    "The cap is twice the demonstration's longest displacement, 2 L; yours is L.",
+    "2 * L",
+    "L",
+)
+reward.mistake(
+    "The approach counts by what the demonstration's object still has to go; yours counts always.",
+    "-(1 - np.linalg.norm(goal) / L) * length(g_next)",
+    "-length(g_next)",
+)
+reward.mistake(
+    "The approach counts by what the DEMONSTRATION's object still has to go; you take the robot's. "
+    "It could touch the object once and be done with it.",
+    "np.linalg.norm(goal) / L) * length",
+    "np.linalg.norm(d_next) / L) * length",
+)
+reward.mistake(
+    "The approach counts in the beginning and fades: 1 minus the share of the way.",
+    "(1 - np.linalg.norm(goal) / L)",
+    "(np.linalg.norm(goal) / L)",
+)
+reward.mistake(
+    "r2 compares two steps: the object's, d_next - d, and the demonstration's.",
+    "d_next - d - (goal - now)",
+    "d_next - (goal - now)",
+)
+reward.mistake(
+    "The demonstration's step leads from its frame t to t + 1; yours goes the other way.",
+    "(goal - now)",
+    "(now - goal)",
+)
+reward.mistake(
+    "A reward is at most 0 here: each part is minus a length.",
+    "r1 = -length",
+    "r1 = length",
+    "r2 = -length",
+    "r2 = length",
+    "r3 = -(",
+    "r3 = (",
+)
+reward.mistake(
+    "L is the LONGEST displacement; the last need not be it.",
+    "np.linalg.norm(d_E, axis=1).max()",
+    "np.linalg.norm(d_E[-1])",
+)
+reward.mistake(
+    "The weights belong to r1, r2 and r3 in this order.",
+    "lam[0] * r1 + lam[1] * r2 + lam[2] * r3",
+    "lam[2] * r1 + lam[1] * r2 + lam[0] * r3",
+)

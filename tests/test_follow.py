@@ -1,0 +1,262 @@
+"""The track reward by hand, what its wrapper tells an agent, and the method from video to page."""
+
+import json
+import warnings
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from toy_square import HERE, scene, texture, ways
+
+import tasks
+from lbw_minimal import follow, tracks, video
+from lbw_minimal.follow import TrackReward, TrackWrapper
+from lbw_minimal.imitate import Run
+from lbw_minimal.training import InputError
+from tasks.__main__ import main
+from tasks.push import RECIPE
+from tasks.world import expert_actions
+from tasks.world import film as film_of
+
+PATH = np.array([[0, 0], [0, 0], [4, 0], [8, 0]], float)  # L = 8
+still = np.zeros(2)
+
+
+def test_the_reward_of_three_steps_by_hand():
+    """lam = (1, 3, 2). Rest, with the arm 4 away: only r3. Then 4 are asked for and 3 done: r1 =
+    r2 = -1/8, half of the way is left and the arm is 2 away. Then all is as it should be."""
+    reward = TrackReward(PATH, lam=(1, 3, 2))
+    d = [np.array([x, 0.0]) for x in (0, 0, 3, 8)]
+    g = [np.array([0.0, y]) for y in (4, 2, 5)]
+    found = [reward(d[t], d[t + 1], g[t], t) for t in range(3)]
+    assert found[0] == (pytest.approx(-1), {"r1": 0, "r2": 0, "r3": pytest.approx(-0.5)})
+    assert found[1][1] == pytest.approx({"r1": -1 / 8, "r2": -1 / 8, "r3": -1 / 8})
+    assert found[1][0] == pytest.approx(-1 / 8 - 3 / 8 - 2 / 8)
+    # 8 - 3 = 5 where the demonstration moves by 4: r2 = -1/8; no way is left, so no approach
+    assert found[2][1] == pytest.approx({"r1": 0, "r2": -1 / 8, "r3": 0})
+
+
+def test_after_its_end_the_demonstration_rests_at_its_goal():
+    reward = TrackReward(PATH)
+    goal = PATH[-1]
+    assert reward(goal, goal, still, 9) == (0, {"r1": 0, "r2": 0, "r3": 0})
+    assert reward.clock(9) == 1 and reward.clock(0) == 0
+
+
+def test_an_object_that_was_thrown_away_costs_a_bounded_share():
+    reward = TrackReward(PATH, lam=(1, 1, 1))
+    far = np.array([0.0, 1e6])
+    _, parts = reward(still, far, far, 0)
+    assert parts == {"r1": -2, "r2": -2, "r3": -2}
+
+
+def test_an_object_that_starts_ahead_has_its_way_stretched_to_the_same_goal():
+    """8 pixels in the demonstration; 2 ahead there are 6 to go, so each counts 8 / 6."""
+    reward = TrackReward(PATH)
+    assert reward.stretch(np.array([2.0, 5.0])) == pytest.approx(8 / 6)  # aside is no way
+    assert reward.stretch(np.array([-8.0, 0.0])) == pytest.approx(0.5)
+    assert reward.stretch(np.array([8.0, 0.0])) == pytest.approx(5)  # it is there: no division by 0
+
+
+def test_a_demonstration_that_is_too_long_is_hurried_and_a_short_one_keeps_its_time():
+    slow = np.linspace((0, 0), (20, 0), 101)
+    assert len(TrackReward(slow, horizon=50).d_E) == 40
+    np.testing.assert_array_equal(TrackReward(slow, horizon=300).d_E, slow)
+    assert TrackReward(slow, horizon=50).episode == 50
+
+
+@pytest.mark.parametrize("path", [np.zeros((9, 2)), np.zeros((2, 2)), np.zeros((9, 3))])
+def test_a_path_that_shows_nothing_is_refused(path):
+    with pytest.raises(InputError):
+        TrackReward(path)
+
+
+class Film(gym.Env):
+    """Plays given frames, whatever one does. The world behind them is closed: reading it raises."""
+
+    observation_space = gym.spaces.Box(0, 255, (84, 84, 3), np.uint8)
+    action_space = gym.spaces.Box(-1, 1, (3,), np.float32)
+
+    class Info(dict):
+        def _closed(self, *_):
+            raise AssertionError("the simulator's state was read")
+
+        __getitem__ = get = items = values = _closed
+
+    def __init__(self, frames, reward=0.0, ends=10**6):
+        self.frames, self.own_reward, self.ends, self.t = frames, reward, ends, 0
+
+    def reset(self, *, seed=None, options=None):
+        super().reset(seed=seed)
+        self.t = 0
+        return self.frames[0], self.Info(object=[1.0, 2.0])
+
+    def step(self, action):
+        self.t += 1
+        frame = self.frames[min(self.t, len(self.frames) - 1)]
+        return frame, self.own_reward, self.t >= self.ends, False, self.Info(is_success=True)
+
+
+WALL = texture().astype(np.uint8)
+
+
+def wrapped(frames, **options):
+    shown = tracks.watch(ways()[0])
+    tracker = tracks.Tracker(shown, WALL)
+    return TrackWrapper(Film(frames, **options), tracker, TrackReward(shown.path))
+
+
+def play(env, steps=18):
+    """Observations (steps + 1, 15) and rewards (steps,) of an episode."""
+    seen, paid = [env.reset(seed=0)[0]], []
+    for _ in range(steps):
+        obs, r, *_ = env.step(np.zeros(3, np.float32))
+        seen.append(obs)
+        paid.append(r)
+    return np.array(seen), np.array(paid)
+
+
+def test_gymnasium_has_nothing_to_complain_about(monkeypatch):
+    monkeypatch.setattr(Film, "Info", dict)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warnings.filterwarnings("ignore", "(?s).*is different from the unwrapped version")
+        check_env(wrapped(ways()[0]), skip_render_check=True)
+
+
+def test_an_agent_sees_displacement_arm_motion_and_the_way_ahead():
+    frames, d = ways()
+    shown = tracks.watch(frames)
+    seen, paid = play(wrapped(frames))
+    np.testing.assert_allclose(42 * seen[:, 0:2], d[:19], atol=0.2)
+    np.testing.assert_allclose(seen[1:, 4:8], np.diff(seen[:, :4], axis=0), atol=1e-6)
+    np.testing.assert_allclose(seen[2:, 8:12], seen[1:-1, 4:8], atol=1e-6)
+    ahead = shown.path[1:20] - 42 * seen[:, :2]
+    np.testing.assert_allclose(42 * seen[:, 12:14], ahead, atol=1e-4)
+    np.testing.assert_allclose(seen[:, 14], np.arange(19) / 19, atol=1e-6)
+    # It follows the demonstration, and there is no arm in sight: nothing is to pay.
+    np.testing.assert_allclose(paid, 0, atol=0.1)
+
+
+def test_observation_and_reward_are_functions_of_the_frames():
+    """Another world with the same pictures, closed and paying 1,000 a step: no difference."""
+    frames, _ = ways()
+    poor, rich = play(wrapped(frames)), play(wrapped(frames, reward=1000.0))
+    assert (poor[0] == rich[0]).all() and (poor[1] == rich[1]).all()
+
+
+def test_an_object_that_stays_earns_less_than_one_that_goes_the_demonstrations_way():
+    frames, _ = ways()
+    _, paid = play(wrapped(frames))
+    _, idle = play(wrapped(frames[:1]))
+    assert idle.sum() < paid.sum() - 5
+
+
+def test_where_the_object_starts_makes_no_difference_to_what_is_seen_of_its_way():
+    """Moved down, aside of its way: the same displacements, the same reward."""
+    path, _ = ways(pace=(1.5, 0.0))
+    wall = np.full((84, 84, 3), (120.0, 130.0, 150.0))
+    _, d = ways(pace=(1.5, 0.0))
+    shown = tracks.watch(path)
+    tracker = tracks.Tracker(shown, wall.astype(np.uint8))
+    seen = []
+    for start in (HERE, HERE + (0, 6)):
+        frames = np.stack([scene(start + x, wall) for x in d])
+        seen.append(play(TrackWrapper(Film(frames), tracker, TrackReward(shown.path))))
+    np.testing.assert_allclose(seen[0][0], seen[1][0], atol=0.01)
+    np.testing.assert_allclose(seen[0][1], seen[1][1], atol=0.05)
+
+
+def test_an_episode_that_the_task_ends_is_cut_and_never_terminal():
+    env = wrapped(ways()[0], ends=3)
+    env.reset(seed=0)
+    ends = [env.step(np.zeros(3, np.float32))[2:4] for _ in range(3)]
+    assert ends == [(False, False), (False, False), (False, True)]
+
+
+@pytest.mark.parametrize("task", ["push", "slide", "coffee", "drawer"])
+def test_an_idle_robot_earns_less_than_one_that_does_the_task(task):
+    """The scripted expert, at its own pace, on the kit's own videos."""
+    demo, _ = video.read(tasks.VIDEOS / task / "expert_01.mp4")
+    env, reward = follow.watched(
+        gym.make(tasks.id_of(task), jitter=0.005), demo, tasks.pace_film(task)
+    )
+    stage = tasks.bare(task, jitter=0.005)
+    _, _, take = film_of(stage, 7, expert_actions(stage))
+    stage.close()
+    earned = []
+    for actions in (take.actions, []):
+        env.reset(seed=7)
+        total, over = 0.0, False
+        for t in range(reward.episode):
+            action = actions[t] if t < len(actions) else np.zeros(3, np.float32)
+            _, r, _, over, _ = env.step(action)
+            total += r
+        assert over
+        earned.append(total)
+    env.close()
+    assert earned[1] < earned[0] - 10
+
+
+def test_the_method_goes_from_a_video_to_a_policy_and_repeats_nothing(tmp_path, monkeypatch):
+    demo, _ = video.read(tasks.VIDEOS / "push" / "expert_01.mp4")
+    recipe = type(RECIPE)(human_frames=0, robot_frames=0, policy_steps=40)
+
+    def learn():
+        env = gym.make(tasks.id_of("push"), jitter=0.005)
+        return follow.follow(env, demo, tasks.pace_film("push"), recipe, seed=0, run=Run(tmp_path))
+
+    policy, env = learn()
+    obs, _ = env.reset(seed=0)
+    assert obs.shape == (15,) and policy.act(obs, deterministic=True).shape == (3,)
+    monkeypatch.setattr(follow.sac, "train", lambda *_, **__: pytest.fail("trained again"))
+    again, _ = learn()
+    np.testing.assert_array_equal(
+        again.act(obs, deterministic=True), policy.act(obs, deterministic=True)
+    )
+    assert set(Run(tmp_path).metrics["stages"]) == {"policy"}
+
+
+def test_a_run_ends_with_a_page_and_is_replayed(tmp_path, capfd):
+    out = tmp_path / "run"
+    arguments = ["push", "--method", "tracks", "--threads", "1", "--set", "policy_steps=40"]
+    main([*arguments, "--episodes", "1", "--out", str(out)])
+    page = (out / "report.html").read_text()
+    assert "track, do not translate" in page and "r3" in page and "keypoint" not in page
+    metrics = json.loads((out / "metrics.json").read_text())
+    assert metrics["settings"]["recipe"] == {"policy_steps": 40, "updates": 2, "entropy": -1.0}
+    assert set(metrics["stages"]) == {"robot_video", "policy"}
+    replay = ["push", "--method", "tracks", "--evaluate", "--weights", str(out)]
+    main([*replay, "--episodes", "1", "--jitter", "0.04", "--out", str(tmp_path / "replay")])
+    assert "A replay" in (tmp_path / "replay" / "report.html").read_text()
+    assert capfd.readouterr().out.count("push: ") == 2
+
+
+@pytest.mark.parametrize(
+    ("arguments", "why"),
+    [
+        (["reach"], "here none is moved"),
+        (["push", "--from-scratch"], "no keypoints"),
+        (["push", "--reward", "literal"], "no keypoints"),
+        (["push", "--weights", "solutions/weights/push"], "trains all of its networks anew"),
+        (["push", "--evaluate"], "name a run by --weights"),
+        (["push", "--videos", "3"], "watch one video"),
+        (["push", "--device", "cpu"], "on the CPU"),
+        (["push", "--set", "K=4"], "has no 'K'"),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_what_does_nothing_here_is_refused_in_a_sentence(arguments, why, tmp_path, capsys):
+    out = tmp_path / "run"
+    assert main([*arguments, "--method", "tracks", "--out", str(out)]) == 2
+    assert not out.exists()
+    said = capsys.readouterr().err
+    assert why in said and said.count("\n") == 1
+
+
+def test_a_policy_that_sees_keypoints_is_no_policy_of_tracks(tmp_path, capsys):
+    weights = str(tasks.WEIGHTS / "push")
+    replay = ["push", "--method", "tracks", "--evaluate", "--weights", weights]
+    assert main([*replay, "--out", str(tmp_path / "run")]) == 2
+    assert "41 numbers, and 15 come with this method" in capsys.readouterr().err
