@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import tasks
-from lbw_minimal import classifier, rivals, sac_ae
+from lbw_minimal import classifier, rivals, sac, sac_ae
 from lbw_minimal.classifier import GoalClassifier
 from lbw_minimal.training import InputError
 from tasks.commands import JITTER, controls
@@ -235,6 +235,16 @@ def test_a_rival_is_tested_beside_it_on_the_same_starts(tmp_path, monkeypatch):
         controls.method_of(tmp_path)
     (tmp_path / "settings.json").write_text('{"method": "avid"}')
     assert controls.method_of(tmp_path) == "AVID-m"
+
+
+def test_a_policy_by_object_tracks_is_tested_beside_it_as_it_was_trained(tmp_path, monkeypatch):
+    """On the film of the run's own seed, from which its empty scene is made."""
+    filmed, film = [], tasks.pace_film
+    monkeypatch.setattr(tasks, "pace_film", lambda *a: filmed.append(a) or film(*a))
+    (tmp_path / "settings.json").write_text('{"method": "tracks", "seed": 3}')
+    sac.save(tmp_path / "policy.safetensors", sac.SAC(15, 3))
+    assert controls.rival_wins("push", tmp_path, 0.01, episodes=1) == 0
+    assert filmed == [("push", 3)] and controls.method_of(tmp_path) == "Object tracks"
 
 
 def test_the_shipped_policy_reaches_and_idle_does_not(tmp_path, capsys, monkeypatch):

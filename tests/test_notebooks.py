@@ -43,7 +43,7 @@ def grading(notebook):
 
 
 def test_every_exercise_belongs_to_a_notebook():
-    assert len(SOURCES) == 13
+    assert len(SOURCES) == 14
     assert {e.id for path in SOURCES for e in of(path)} == set(ALL)
 
 

@@ -19,7 +19,7 @@ import torch
 from gymnasium.wrappers import TimeLimit
 
 import tasks
-from lbw_minimal import rivals, sac
+from lbw_minimal import follow, rivals, sac, video
 from lbw_minimal.imitate import watched
 from lbw_minimal.report import wilson
 from lbw_minimal.training import InputError, counted, write_atomic
@@ -29,6 +29,7 @@ from tasks.commands.table import METHODS, markdown
 from tasks.world import SIZE, TaskEnv
 
 JITTERS = (JITTER, 0.01, 0.02, 0.04)  # m
+TRACKS = "Object tracks"
 TRIAL_SEED, TRIALS = 2_000_000, 10  # starts on which blind robots are chosen
 LIBRARY = 50  # episodes of the policy, from which the robot that looks once takes one
 BLIND = (  # what has no eyes at all
@@ -137,8 +138,15 @@ def best(env: gym.Env, robots: list[Robot], trials: int) -> Robot:
 
 
 def rival_wins(task: str, run: Path, jitter: float, episodes: int) -> int:
-    """Successful episodes of a rival's policy; run: the folder of its run."""
-    policy, env = rivals.replayed(gym.make(tasks.id_of(task), jitter=jitter), run, task)
+    """Successful episodes of another method's policy; run: the folder of its run."""
+    env: gym.Env = gym.make(tasks.id_of(task), jitter=jitter)
+    policy: sac.Policy
+    if settings(run)["method"] == "tracks":
+        demo, _ = video.read(tasks.VIDEOS / task / "expert_01.mp4")
+        env, _ = follow.watched(env, demo, tasks.pace_film(task, settings(run)["seed"]))
+        policy = sac.load(run / "policy.safetensors")
+    else:
+        policy, env = rivals.replayed(env, run, task)
     count = wins(env, lambda obs, t: policy.act(obs, deterministic=True), episodes)
     env.close()
     return count
@@ -215,7 +223,7 @@ def parser() -> Parser:
     p.add_argument("--jitter", type=metres, metavar="M", help="test at this start jitter alone (m)")
     p.add_argument("--seed", type=at_least(0), default=0, help="that the weights were trained with")
     p.add_argument(
-        "--beside", type=Path, action="append", default=[], metavar="DIR", help="a rival's run"
+        "--beside", type=Path, action="append", default=[], metavar="DIR", help="a run beside it"
     )
     p.add_argument(
         "--out", type=Path, default=Path("runs/controls"), metavar="DIR", help="its folder"
@@ -235,13 +243,19 @@ def main(argv: list[str]) -> None:
     print(table(note), end="")
 
 
-def method_of(run: Path) -> str:
-    """The paper's name of the rival whose run is in that folder. Raises InputError for others."""
+def settings(run: Path) -> dict[str, Any]:
+    """The settings of the run in that folder; those of LbW where none are noted."""
     note = run / "settings.json"
-    method = json.loads(note.read_text(encoding="utf-8"))["method"] if note.exists() else "lbw"
-    if method not in METHODS:
+    return json.loads(note.read_text(encoding="utf-8")) if note.exists() else {"method": "lbw"}
+
+
+def method_of(run: Path) -> str:
+    """The name of the method whose run is in that folder. Raises InputError for LbW's own."""
+    method = settings(run)["method"]
+    names = {rival: name for rival, (name, _) in METHODS.items()} | {"tracks": TRACKS}
+    if method not in names:
         raise InputError(f"--beside {run}: no run of a rival is there.")
-    return METHODS[method][0]
+    return names[method]
 
 
 def measure(
