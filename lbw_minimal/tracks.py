@@ -136,7 +136,7 @@ def watch(demo: np.ndarray) -> Demonstration:
     own = object_points(paths, kept)
     if own.sum() < LEAST:
         raise InputError(
-            "no object rests first and moves later in the demonstration; tracks need one."
+            "no object rests first and moves later in the demonstration; tracks follow one."
         )
     d = np.median(paths[:, own] - points[own], axis=1)  # (N, 2)
     mask = silhouette(demo[0], demo[-1], d[-1], points[own])
@@ -183,7 +183,9 @@ def background(film: np.ndarray) -> np.ndarray:
     return np.take_along_axis(levels, middle[None], axis=0)[0]
 
 
-def arm_near(frame, wall, thing, place):
+def arm_near(
+    frame: np.ndarray, wall: np.ndarray, thing: np.ndarray, place: np.ndarray
+) -> np.ndarray | None:
     """Where the arm's pixels nearest to `place` (2,) are, (2,); None if no arm is in sight.
 
     frame, wall (84, 84, 3) uint8; thing (84, 84): where the object is. The arm is what stands out

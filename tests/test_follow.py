@@ -236,7 +236,7 @@ def test_a_run_ends_with_a_page_and_is_replayed(tmp_path, capfd):
 @pytest.mark.parametrize(
     ("arguments", "why"),
     [
-        (["reach"], "here none is moved"),
+        (["reach"], "no object rests first and moves later"),
         (["push", "--from-scratch"], "no keypoints"),
         (["push", "--reward", "literal"], "no keypoints"),
         (["push", "--weights", "solutions/weights/push"], "trains all of its networks anew"),

@@ -122,8 +122,6 @@ def check(name: str, args: argparse.Namespace, argv: list[str]) -> Job:
     from_scratch = lbw and (args.from_scratch or args.fast or args.translate_clip)
     refuse_idle_options(args, from_scratch)
     module = tasks.module(name)
-    if args.method == "tracks" and getattr(module, name.capitalize()).CONTACT is None:
-        raise InputError(f"{name}: --method tracks follows an object, and here none is moved.")
     fast = FAST | FAST_PIXELS if args.method in PIXELS else FAST
     recipe = dataclasses.replace(module.RECIPE, **fast) if args.fast else module.RECIPE
     recipe = dataclasses.replace(recipe, **read_settings(args, from_scratch))
@@ -133,7 +131,7 @@ def check(name: str, args: argparse.Namespace, argv: list[str]) -> Job:
     clip = usable(name, args.video) if args.video and not args.translate_clip else None
     experts = [clip.film] if clip else [read_video(path) for path in videos(name, args)]
     if args.method == "tracks":
-        tracks.watch(experts[0])  # raises InputError if it moves no object
+        tracks.watch(experts[0])  # raises InputError if it moves no object, as reach's
     learns = from_scratch or (args.method == "avid" and not args.evaluate)
     random = np.empty((0, video.SIZE, video.SIZE, 3), np.uint8)
     # It takes seconds to read. A clip that is translated is the human domain alone.
