@@ -15,10 +15,13 @@ from lbw_minimal.training import InputError
 SMOOTH = 0.05  # s, sigma of the low-pass; a webcam's frames are 0.1 s apart, a phone's 0.03
 REST = 0.3  # s that are kept of a rest before the hand starts and after the object has arrived
 SURE = 0.5  # a point found with less is as good as not found
-FOUND = 0.5  # share of the frames in which a point has to be found
+FOUND = 0.5  # share of the frames in which the object has to be found
+# The same of the tip: while it rests it is like its clip's median, and told from that by little.
+TIP_FOUND = 0.25
 LEAST_FRAMES = 8  # of a piece: 0.3 s of a phone's, 0.8 s of a slow webcam's
 LEAST_WAY = 0.04  # of the picture's shorter side: a detector errs by 0.01
 JUMP = 0.04  # of the same, from one frame to the next, where the picture changes at once as well
+SIDE_ON = "film from the side, so that arm and hand come in from the left or right edge, uncovered"
 RESTS = 0.05  # of the fastest speed; what is slower rests
 
 
@@ -78,7 +81,7 @@ def longest_piece(tracks: Tracks, touched: bool, notes: list[str]) -> Tracks:
         if len(seen) and seen[-1] + 1 - seen[0] >= LEAST_FRAMES:
             pieces.append(tracks.part(seen[0], seen[-1] + 1))
     if not pieces:
-        if (tracks.tip_sure >= SURE).mean() < FOUND:
+        if (tracks.tip_sure >= SURE).mean() < TIP_FOUND:
             raise _no_arm(tracks)
         raise Unusable(
             f"{len(tracks.times)} frames are too few, even without cuts {LEAST_FRAMES} are needed",
@@ -114,14 +117,14 @@ def _no_arm(tracks):
     share = (tracks.tip_sure >= SURE).mean()
     return Unusable(
         f"no arm is seen in most of the clip, a hand's tip in {share:.0%} of it",
-        "film from the side, so that arm and hand come in from the left or right edge, uncovered",
+        SIDE_ON,
     )
 
 
 def trusted(tracks: Tracks, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Times and points (n, 2) of the frames in which the tip or the object is surely found."""
     sure = getattr(tracks, f"{name}_sure") >= SURE
-    if sure.mean() < FOUND and name == "tip":
+    if sure.mean() < TIP_FOUND and name == "tip":
         raise _no_arm(tracks)
     if sure.mean() < FOUND:
         raise Unusable(

@@ -11,6 +11,7 @@ import argparse
 import shlex
 import sys
 import tempfile
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,7 @@ from lbw_minimal.clips import footage
 from lbw_minimal.clips.detector import Detector, Found, refine
 from lbw_minimal.clips.motion import small
 from lbw_minimal.clips.page import write_page
+from lbw_minimal.clips.patches import mended
 from lbw_minimal.clips.paths import Tracks, Unusable
 from lbw_minimal.clips.reader import Clip, read_clip
 from lbw_minimal.clips.retarget import FPS, Motion, Scene, lay
@@ -213,8 +215,9 @@ def follow(result: Prepared, choices: Choices) -> Motion:
                 f"{clip.times[0]:.1f} to {clip.times[-1]:.1f} s",
                 "click into a frame of the page: it writes the place in the picture as it was read",
             )
-    result.warnings += footage.check(frames, clip.cuts)
-    found = look(frames)
+    frames, warnings = footage.check(frames, clip.cuts)
+    result.clip, result.warnings = replace(clip, frames=frames), result.warnings + warnings
+    found = look(frames, clip.cuts)
     tracks = Tracks(
         clip.times, found.tip, found.object, found.tip_sure, found.object_sure,
         min(height, width), tuple(clip.cuts),
@@ -229,9 +232,9 @@ def follow(result: Prepared, choices: Choices) -> Motion:
     return lay(tracks, result.scene, choices.mirror)
 
 
-def look(frames: np.ndarray) -> Found:
-    """Tip and object in a clip's frames, as the shipped detector sees them."""
-    return refine(frames, Detector.load(EYES).detect(frames))
+def look(frames: np.ndarray, cuts: Sequence[int] = ()) -> Found:
+    """Tip and object in a clip's frames, as the shipped detector sees them and patches agree."""
+    return refine(frames, mended(frames, Detector.load(EYES).detect(frames), cuts))
 
 
 def is_own(clip: Clip, first: np.ndarray) -> bool:

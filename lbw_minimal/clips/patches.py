@@ -1,0 +1,174 @@
+"""Whether what was found is one thing that looks the same all along, and where else it may be.
+
+Not from the paper. A detector that looks at single frames takes a hand for the object now and then,
+or a thing that nobody touches. An object is one patch of the picture: it rests while the hand comes
+near, and it goes along with it, or by itself, later on. So patches are cut out where the detector
+saw an object, in several frames; each is looked for in all frames; and the path counts on which a
+patch stays like itself, rests first, and moves later.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise, product
+
+import cv2
+import numpy as np
+
+from lbw_minimal.clips.detector import SURE, Found
+from lbw_minimal.clips.paths import median3
+
+SMALL = 160  # pixels, the longer side of the frames in which patches are looked for
+LOOK_AT = 48  # frames of a shot that are looked at, spread over it
+ANCHORS = 7  # of these, from which patches are cut
+# Pixels, half a patch: a large one is told from others better, a small one has less of the hand.
+HALVES = 6, 9
+PLAIN = 2  # grey levels, the deviation of a patch in which nothing is seen
+PEAKS = 6  # places in a frame where a patch may be
+APART = 4  # pixels between these
+LEAP, STRAY = 12.0, 0.35  # pixels from frame to frame, and what they cost, in correlation
+ALIKE = 0.6  # a correlation, from which on a patch is the same thing
+SEEN = 0.4  # share of the frames in which it has to be
+MOVED = 0.08  # of the shorter side: a patch that goes less far stays where it is
+BEGUN = 0.1  # of its way: by then it moves
+ALONE = 0.15  # of the tip's way that an object waits for at least; a piece of the hand never does
+TO_AND_FRO = 3.5  # times the way: what goes so much farther swings, or was taken for another
+LEAPS = 0.4  # times the way: what goes farther at once was taken for another
+NEAR = 0.4  # of the shorter side: so near is the hand when the object starts to move
+
+
+@dataclass(frozen=True)
+class Path:
+    """A patch's way through the n frames that are looked at."""
+
+    places: np.ndarray  # (n, 2) pixels of the small frames
+    alike: np.ndarray  # (n,) correlation with the patch
+    tip: np.ndarray  # (n, 2) pixels, where the hand is
+    side: int  # pixels, the shorter side of the small frames
+
+    @property
+    def seen(self) -> bool:
+        """Whether the patch is there in enough of the frames."""
+        return bool((self.alike > ALIKE).mean() >= SEEN)
+
+    @property
+    def way(self) -> float:
+        """How far it goes, in shorter sides of the frame."""
+        return float(np.linalg.norm(np.ptp(median3(self.places), axis=0)) / self.side)
+
+    @property
+    def start(self) -> int:
+        """The frame by which it has left where it was."""
+        gone = np.linalg.norm(median3(self.places) - self.places[0], axis=1)
+        return int((gone > BEGUN * self.way * self.side).argmax())
+
+    @property
+    def alone(self) -> float:
+        """The share of the tip's way that is gone before: an object waits until the hand comes."""
+        steps = np.linalg.norm(np.diff(median3(self.tip), axis=0), axis=1)
+        return float(steps[: self.start].sum() / max(steps.sum(), 1e-6))
+
+    @property
+    def pushed(self) -> bool:
+        """Whether it moves as an object does: not with the hand from the start, not to and fro, not
+        in leaps, and by a hand that is near."""
+        if self.way < MOVED or self.alone < ALONE:
+            return False
+        way, t = self.way * self.side, max(0, self.start - 1)
+        steps = np.linalg.norm(np.diff(median3(self.places), axis=0), axis=1)
+        near = np.linalg.norm(self.places[t] - self.tip[t]) < NEAR * self.side
+        return bool(near and steps.sum() < TO_AND_FRO * way and steps.max() < LEAPS * way)
+
+    @property
+    def worth(self) -> float:
+        """How much speaks for its being the object."""
+        return float((self.alike > ALIKE).mean() + 0.5 * self.alike.mean() + min(self.alone, 0.3))
+
+
+def mended(frames: np.ndarray, found: Found, cuts: Sequence[int] = ()) -> Found:
+    """Found, with the object's path that of the best patch in each shot.
+
+    cuts: frames with which a new shot begins. Where no patch moves as an object does, the detector
+    is believed, unless most of what it saw rests: then nothing moves.
+    """
+    places, sure = found.object.copy(), found.object_sure.copy()
+    for first, last in pairwise([0, *cuts, len(frames)]):
+        part = Found(*(getattr(found, name)[first:last] for name in vars(found)))
+        k, scale, some = paths(frames[first:last], part)
+        best = chosen(some)
+        if best is not None:
+            along = np.arange(last - first)
+            for axis in (0, 1):
+                places[first:last, axis] = np.interp(along, k, best.places[:, axis] / scale)
+            # A patch that is just alike is just sure.
+            sure[first:last] = np.interp(along, k, np.clip(1 + (best.alike - 1) / 0.8, 0, 1))
+    return replace(found, object=places, object_sure=sure)
+
+
+def chosen(some: list[Path]) -> Path | None:
+    """The path of the object among those of patches; None if none is better than the detector."""
+    seen = [path for path in some if path.seen]
+    pushed = [path for path in seen if path.pushed]
+    if pushed:
+        return max(pushed, key=lambda path: path.worth)
+    still = [path for path in seen if path.way < MOVED]
+    return max(still, key=lambda path: path.worth) if len(still) > len(some) / 2 else None
+
+
+def paths(frames: np.ndarray, found: Found) -> tuple[np.ndarray, float, list[Path]]:
+    """The frames (n,) that are looked at, small pixels in a pixel, and the paths of the patches."""
+    k = np.unique(np.linspace(0, len(frames) - 1, LOOK_AT).round().astype(int))
+    scale = min(1.0, SMALL / max(frames.shape[1:3]))
+    size = round(frames.shape[2] * scale), round(frames.shape[1] * scale)
+    small = [
+        cv2.GaussianBlur(cv2.resize(frames[t], size, interpolation=cv2.INTER_AREA), (3, 3), 0)
+        for t in k
+    ]
+    tip, out = _tip(found, k) * scale, []
+    sure = np.flatnonzero(found.object_sure[k] > SURE)
+    some = sure[
+        np.unique(np.linspace(0, len(sure) - 1, min(ANCHORS, len(sure))).round().astype(int))
+    ]
+    for i, half in product(some, HALVES) if min(size) > 3 * max(HALVES) else ():
+        x, y = np.round(found.object[k[i]] * scale).astype(int)
+        x, y = np.clip(x, half, size[0] - half - 1), np.clip(y, half, size[1] - half - 1)
+        patch = small[i][y - half : y + half + 1, x - half : x + half + 1]
+        if patch.std() > PLAIN:
+            out.append(_path(small, patch, tip))
+    return k, scale, out
+
+
+def _tip(found, k):
+    """Where the tip (n, 2) is in frames k, between those in which it is surely seen."""
+    sure = np.flatnonzero(found.tip_sure > SURE)
+    if not len(sure):
+        return np.zeros((len(k), 2))
+    return np.stack([np.interp(k, sure, found.tip[sure, axis]) for axis in (0, 1)], 1)
+
+
+def _path(small, patch, tip):
+    peaks = [_peaks(cv2.matchTemplate(one, patch, cv2.TM_CCOEFF_NORMED)) for one in small]
+    cost, back = [1 - peaks[0][1]], []
+    for (before, _), (here, alike) in zip(peaks[:-1], peaks[1:], strict=True):
+        far = np.linalg.norm(here[:, None] - before[None], axis=2)  # (here, before)
+        total = cost[-1][None] + STRAY * (far / LEAP) ** 2
+        back.append(total.argmin(1))
+        cost.append(total.min(1) + 1 - alike)
+    at = [int(cost[-1].argmin())]
+    for choice in reversed(back):
+        at.append(int(choice[at[-1]]))
+    taken = [(places[i], alike[i]) for (places, alike), i in zip(peaks, at[::-1], strict=True)]
+    places = np.array([place for place, _ in taken]) + len(patch) / 2
+    return Path(places, np.array([alike for _, alike in taken]), tip, min(small[0].shape[:2]))
+
+
+def _peaks(alike):
+    """The highest places (PEAKS, 2) of a map, and their heights."""
+    alike, places, heights = alike.copy(), [], []
+    for _ in range(PEAKS):
+        _, height, _, (x, y) = cv2.minMaxLoc(alike)
+        places.append((x, y))
+        heights.append(height)
+        cv2.rectangle(alike, (x - APART, y - APART), (x + APART, y + APART), -1.0, -1)
+    return np.array(places, float), np.array(heights)
