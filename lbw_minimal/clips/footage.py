@@ -22,6 +22,7 @@ from lbw_minimal.clips.paths import LEAST_FRAMES, SIDE_ON, Unusable
 TREMBLES, MOVES = 0.005, 0.09
 LARGE = 0.01  # of the picture: less that moves is no arm
 EDGE = 3  # pixels from the picture's edge, over which an arm comes in
+FAINT = 10  # grey levels: at the shoulder an arm moves by little
 SOMETIMES = 2  # frames in which something moves: noise does so in one
 LAG = 3  # of the frames that are looked at, in which an arm moves by less than its width
 APART = 0.15  # of the width: so far apart are the arms of two people
@@ -56,7 +57,7 @@ def check(frames: np.ndarray, cuts: Sequence[int] = ()) -> tuple[np.ndarray, lis
         frames = np.concatenate(steady)
         warnings.append("The camera trembles, and the picture was steadied; a stand would help.")
     still, background, _ = before_background(frames[first:last])
-    if not _comes_in(np.abs(still - background) > MOVED):
+    if not _comes_in(np.abs(still - background) > FAINT):
         raise Unusable("no arm is seen, nothing that moves comes in from the edge", SIDE_ON)
     steps = np.abs(still[LAG:] - still[:-LAG]) > MOVED  # (T - LAG, 84, 84)
     if len(steps) and np.mean([_two_arms(step) for step in steps]) > OFTEN:

@@ -3,15 +3,16 @@
 Not from the paper. A detector that looks at single frames takes a hand for the object now and then,
 or a thing that nobody touches. An object is one patch of the picture: it rests while the hand comes
 near, and it goes along with it, or by itself, later on. So patches are cut out where the detector
-saw an object, in several frames; each is looked for in all frames; and the path counts on which a
-patch stays like itself, rests first, and moves later.
+saw an object, in several frames, and where something stands that is gone in the end; each is looked
+for in all frames; and the path counts on which a patch stays like itself, rests first, and moves
+later.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise, product
+from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -24,10 +25,14 @@ LOOK_AT = 48  # frames of a shot that are looked at, spread over it
 ANCHORS = 7  # of these, from which patches are cut
 # Pixels, half a patch: a large one is told from others better, a small one has less of the hand.
 HALVES = 6, 9
+CHANGED = 24  # grey levels between the first and the last frame
+THING = 5, 32  # pixels: what is smaller is no object, what is larger the arm
+LEFT = 4  # things that are looked at because they are gone in the end
 PLAIN = 2  # grey levels, the deviation of a patch in which nothing is seen
-PEAKS = 6  # places in a frame where a patch may be
-APART = 4  # pixels between these
-LEAP, STRAY = 12.0, 0.35  # pixels from frame to frame, and what they cost, in correlation
+PEAKS = 10  # places in a frame where a patch may be
+APART = 4  # pixels between these; paths that differ by less go the same way
+AGREE = 2  # paths: one that goes a way of its own is chance
+LEAP, STRAY = 12.0, 1.5  # pixels from frame to frame, and what they cost, in correlation
 ALIKE = 0.6  # a correlation, from which on a patch is the same thing
 SEEN = 0.4  # share of the frames in which it has to be
 MOVED = 0.08  # of the shorter side: a patch that goes less far stays where it is
@@ -35,6 +40,7 @@ BEGUN = 0.1  # of its way: by then it moves
 ALONE = 0.15  # of the tip's way that an object waits for at least; a piece of the hand never does
 TO_AND_FRO = 3.5  # times the way: what goes so much farther swings, or was taken for another
 LEAPS = 0.4  # times the way: what goes farther at once was taken for another
+KNOWN = 0.4  # of the frames: if the tip is found in fewer, it is not asked
 NEAR = 0.4  # of the shorter side: so near is the hand when the object starts to move
 
 
@@ -44,7 +50,7 @@ class Path:
 
     places: np.ndarray  # (n, 2) pixels of the small frames
     alike: np.ndarray  # (n,) correlation with the patch
-    tip: np.ndarray  # (n, 2) pixels, where the hand is
+    tip: np.ndarray | None  # (n, 2) pixels, where the hand is, if that is known
     side: int  # pixels, the shorter side of the small frames
 
     @property
@@ -65,7 +71,12 @@ class Path:
 
     @property
     def alone(self) -> float:
-        """The share of the tip's way that is gone before: an object waits until the hand comes."""
+        """The share of the tip's way that is gone before: an object waits until the hand comes.
+
+        Where the tip is not known, the share of the frames.
+        """
+        if self.tip is None:
+            return self.start / len(self.places)
         steps = np.linalg.norm(np.diff(median3(self.tip), axis=0), axis=1)
         return float(steps[: self.start].sum() / max(steps.sum(), 1e-6))
 
@@ -77,8 +88,14 @@ class Path:
             return False
         way, t = self.way * self.side, max(0, self.start - 1)
         steps = np.linalg.norm(np.diff(median3(self.places), axis=0), axis=1)
-        near = np.linalg.norm(self.places[t] - self.tip[t]) < NEAR * self.side
-        return bool(near and steps.sum() < TO_AND_FRO * way and steps.max() < LEAPS * way)
+        if self.tip is not None and np.linalg.norm(self.places[t] - self.tip[t]) > NEAR * self.side:
+            return False
+        return bool(steps.sum() < TO_AND_FRO * way and steps.max() < LEAPS * way)
+
+    def agrees(self, other: Path) -> bool:
+        """Whether another patch goes the same way, beside it."""
+        off = self.places - other.places
+        return bool(np.median(np.abs(off - np.median(off, axis=0)).max(1)) < APART)
 
     @property
     def worth(self) -> float:
@@ -110,6 +127,7 @@ def chosen(some: list[Path]) -> Path | None:
     """The path of the object among those of patches; None if none is better than the detector."""
     seen = [path for path in some if path.seen]
     pushed = [path for path in seen if path.pushed]
+    pushed = [path for path in pushed if sum(path.agrees(other) for other in pushed) >= AGREE]
     if pushed:
         return max(pushed, key=lambda path: path.worth)
     still = [path for path in seen if path.way < MOVED]
@@ -125,25 +143,46 @@ def paths(frames: np.ndarray, found: Found) -> tuple[np.ndarray, float, list[Pat
         cv2.GaussianBlur(cv2.resize(frames[t], size, interpolation=cv2.INTER_AREA), (3, 3), 0)
         for t in k
     ]
-    tip, out = _tip(found, k) * scale, []
-    sure = np.flatnonzero(found.object_sure[k] > SURE)
-    some = sure[
-        np.unique(np.linspace(0, len(sure) - 1, min(ANCHORS, len(sure))).round().astype(int))
-    ]
-    for i, half in product(some, HALVES) if min(size) > 3 * max(HALVES) else ():
-        x, y = np.round(found.object[k[i]] * scale).astype(int)
-        x, y = np.clip(x, half, size[0] - half - 1), np.clip(y, half, size[1] - half - 1)
-        patch = small[i][y - half : y + half + 1, x - half : x + half + 1]
-        if patch.std() > PLAIN:
-            out.append(_path(small, patch, tip))
+    tip, out = _tip(found, k), []
+    tip = None if tip is None else tip * scale
+    for i, middle in [*_seen(found, k, scale), *_left(small)]:
+        for half in HALVES if min(size) > 3 * max(HALVES) else ():
+            x, y = np.clip(np.round(middle).astype(int), half, np.array(size) - half - 1)
+            patch = small[i][y - half : y + half + 1, x - half : x + half + 1]
+            if patch.std() > PLAIN:
+                out.append(_path(small, patch, tip))
     return k, scale, out
 
 
+def _seen(found, k, scale):
+    """Some of the frames k and where the detector surely sees an object in them."""
+    sure = np.flatnonzero(found.object_sure[k] > SURE)
+    some = np.linspace(0, len(sure) - 1, min(ANCHORS, len(sure))).round().astype(int)
+    return [(i, found.object[k[i]] * scale) for i in sure[np.unique(some)]]
+
+
+def _left(small):
+    """The first frame and where something stands in it that is gone in the end."""
+    few = max(1, len(small) // 16)
+    first, last = (np.median(part, axis=0) for part in (small[:few], small[-few:]))
+    gone = (np.abs(first - last).max(axis=2) > CHANGED).astype(np.uint8)
+    gone = cv2.morphologyEx(gone, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+    _, _, stats, middles = cv2.connectedComponentsWithStats(gone)
+    things = [
+        (area, middle)
+        for (_, _, w, h, area), middle in zip(stats[1:].tolist(), middles[1:], strict=True)
+        if area >= THING[0] ** 2 and max(w, h) <= THING[1]
+    ]
+    things.sort(key=lambda thing: -thing[0])
+    return [(0, middle) for _, middle in things[:LEFT]]
+
+
 def _tip(found, k):
-    """Where the tip (n, 2) is in frames k, between those in which it is surely seen."""
+    """Where the tip (n, 2) is in frames k, between those in which it is surely seen; None if
+    these are few."""
     sure = np.flatnonzero(found.tip_sure > SURE)
-    if not len(sure):
-        return np.zeros((len(k), 2))
+    if len(sure) < KNOWN * len(found.tip_sure):
+        return None
     return np.stack([np.interp(k, sure, found.tip[sure, axis]) for axis in (0, 1)], 1)
 
 

@@ -17,7 +17,7 @@ REST = 0.3  # s that are kept of a rest before the hand starts and after the obj
 SURE = 0.5  # a point found with less is as good as not found
 FOUND = 0.5  # share of the frames in which the object has to be found
 # The same of the tip: while it rests it is like its clip's median, and told from that by little.
-TIP_FOUND = 0.25
+TIP_FOUND = 0.15
 LEAST_FRAMES = 8  # of a piece: 0.3 s of a phone's, 0.8 s of a slow webcam's
 LEAST_WAY = 0.04  # of the picture's shorter side: a detector errs by 0.01
 JUMP = 0.04  # of the same, from one frame to the next, where the picture changes at once as well
@@ -126,7 +126,7 @@ def trusted(tracks: Tracks, name: str) -> tuple[np.ndarray, np.ndarray]:
     sure = getattr(tracks, f"{name}_sure") >= SURE
     if sure.mean() < TIP_FOUND and name == "tip":
         raise _no_arm(tracks)
-    if sure.mean() < FOUND:
+    if sure.mean() < FOUND and name == "object":
         raise Unusable(
             f"the object is seen in {sure.mean():.0%} of the frames, and hidden or too small else",
             "push it from behind, with the hand between it and the edge of the picture, and film "

@@ -1,0 +1,98 @@
+"""The object is a patch that waits for the hand, whatever a detector takes for it."""
+
+from dataclasses import replace
+
+import cv2
+import numpy as np
+import pytest
+
+from lbw_minimal.clips.detector import Found
+from lbw_minimal.clips.patches import Path, chosen, mended
+from tests.toy_clips import room
+
+H, W, T = 120, 160, 40
+
+
+@pytest.fixture(scope="module")
+def clip():
+    """A hand comes to a box and pushes it on; the frames, the hand's path and the box's."""
+    hand = np.stack([np.interp(np.arange(T), [0, 5, 35], [20, 20, 120]), np.full(T, 60)], 1)
+    box = np.stack([np.maximum(75, hand[:, 0] + 15), np.full(T, 64)], 1)
+    frames = np.repeat(cv2.GaussianBlur(room(H, W), (0, 0), 2)[None], T, axis=0)
+    for frame, (x, y), (bx, by) in zip(frames, hand.astype(int), box.astype(int), strict=True):
+        cv2.rectangle(frame, (bx - 8, by - 8), (bx + 8, by + 8), (200, 40, 30), -1)
+        cv2.circle(frame, (bx, by), 4, (240, 240, 60), -1)
+        cv2.rectangle(frame, (0, y - 6), (x, y + 6), (40, 60, 110), -1)
+        cv2.circle(frame, (x, y), 7, (220, 170, 140), -1)
+    return frames, hand, box
+
+
+def found(hand, thing):
+    return Found(hand, thing, np.ones(T), np.ones(T))
+
+
+def off(mend, box):
+    """Pixels by which a path is off the box's, but for where on the box it is."""
+    error = mend.object - box
+    return np.abs(error - np.median(error, axis=0)).max()
+
+
+def test_a_hand_that_was_taken_for_the_object_is_not_it(clip):
+    frames, hand, box = clip
+    assert off(found(hand, hand), box) > 20
+    mend = mended(frames, found(hand, hand))
+    assert off(mend, box) < 4 and mend.object_sure.mean() > 0.5
+
+
+def test_an_object_that_was_missed_until_the_touch_is_followed_back(clip):
+    frames, hand, box = clip
+    late = np.where(np.arange(T)[:, None] < 20, hand, box)
+    assert off(mended(frames, found(hand, late)), box) < 4
+
+
+def test_each_shot_has_its_own_path(clip):
+    """Before the cut stands the end of the motion, elsewhere in the picture."""
+    frames, hand, box = clip
+    before = np.roll(frames[-10:], 12, axis=1)
+    told = Found(*(np.concatenate([p[-10:] + (0, 12), p]) for p in (hand, box)),
+                 np.ones(T + 10), np.ones(T + 10))  # fmt: skip
+    mend = mended(np.concatenate([before, frames]), told, cuts=(10,))
+    assert off(replace(mend, object=mend.object[10:]), box) < 4
+
+
+def test_where_nothing_moves_but_the_hand_the_object_stays_where_it_is(clip):
+    frames, hand, _ = clip
+    rests = np.repeat([[75.0, 64.0]], T, axis=0)
+    still = np.repeat(frames[:1], T, axis=0)
+    assert np.ptp(mended(still, found(hand, rests)).object, axis=0).max() < 1
+
+
+def a_path(x, tip):
+    places = np.stack([x, 0 * x], 1)
+    return Path(places, np.ones(len(x)), None if tip is None else np.stack([tip, 0 * tip], 1), 120)
+
+
+MOVES = np.interp(np.arange(40), [20, 35], [40, 90])  # after the hand has come
+HAND = np.interp(np.arange(40), [0, 20, 35], [0, 38, 88])
+
+
+@pytest.mark.parametrize(
+    ("path", "is_it"),
+    [
+        (a_path(MOVES, HAND), True),
+        (a_path(MOVES, None), True),
+        (a_path(HAND + 5, HAND), False),  # a sleeve
+        (a_path(MOVES + 200, HAND), False),  # nobody is near
+        (a_path(np.where(np.arange(40) < 20, 40.0, 90.0), HAND), False),  # taken for another
+        (a_path(np.where(np.arange(40) < 20, 40, 60 + 20 * np.sin(np.arange(40))), HAND), False),
+        (a_path(np.full(40, 40.0), HAND), False),
+    ],
+)
+def test_what_waits_and_then_goes_without_leaps_by_a_hand_that_is_near_is_pushed(path, is_it):
+    assert path.pushed == is_it
+
+
+def test_one_path_alone_is_chance():
+    right, other = a_path(MOVES, HAND), a_path(MOVES[::-1].copy(), HAND)
+    assert chosen([right]) is None and chosen([right, replace(right)]) is right
+    assert chosen([right, other]) is None
