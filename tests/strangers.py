@@ -56,6 +56,8 @@ class Stranger:
         """A pattern of the reason for which it is not usable; "" if it is usable."""
         if self.kind == "pulled" and self.task == "slide":
             return FAULTS["pulled"] + "|goes along"
+        if self.kind == "no arm" and self.task == "reach":
+            return FAULTS["still"]  # there is nothing else that could move
         return FAULTS.get(self.kind, "")
 
     def write(self, folder: Path) -> Path:

@@ -1,4 +1,4 @@
-"""Footage that cannot be searched for an arm: nothing moves, the camera does, or two people do."""
+"""Footage that cannot be searched for an arm: nothing moves, or the camera, or two people do."""
 
 import cv2
 import numpy as np
@@ -35,13 +35,15 @@ def arms(room, *sides, frames=30):
 
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_one_arm_before_a_camera_that_stands_still_is_fine(room, side):
-    assert footage.check(arms(room, side)) == []
+    film = arms(room, side)
+    frames, warnings = footage.check(film)
+    assert warnings == [] and frames is film
 
 
 @pytest.mark.parametrize("name", TASKS)
 def test_our_own_human_videos_are_fine(name):
     frames, _ = video.read(VIDEOS / name / "expert_01.mp4")
-    assert footage.check(frames) == []
+    assert footage.check(frames)[1] == []
 
 
 def still(room):
@@ -55,28 +57,52 @@ def panned(room):
 
 
 def hand_held(room):
-    sway = np.random.default_rng(2).integers(0, 12, (30, 2))
-    film = arms(room, "left")
-    return np.stack([np.roll(f, s, (0, 1)) for f, s in zip(film, sway, strict=True)]), "the camera"
+    sway = 8 * np.sin(np.arange(30) / 4) + 8
+    film = arms(cv2.resize(room, None, fx=1.2, fy=1.2), "left")
+    views = [np.float32([[1, 0, -s], [0, 1, -s]]) for s in sway]
+    return np.stack(
+        [cv2.warpAffine(f, v, SIZE[::-1], borderMode=cv2.BORDER_REFLECT)
+         for f, v in zip(film, views, strict=True)]
+    ), "the camera moves"  # fmt: skip
+
+
+def few_frames(room):
+    return arms(room, "left")[10:15], "5 frames in one go are too few"
+
+
+def no_arm(room):
+    film = np.repeat(room[None, : SIZE[0], : SIZE[1]], 30, axis=0).copy()
+    for i, frame in enumerate(film):
+        frame[60:80, 50 + i : 75 + i] = (200, 40, 30)  # a toy that drives alone
+    return film, "no arm is seen"
 
 
 def two_people(room):
     return arms(room, "left", "right"), "several people"
 
 
-@pytest.mark.parametrize("fault", [still, panned, hand_held, two_people], ids=lambda f: f.__name__)
+@pytest.mark.parametrize(
+    "fault", [still, panned, hand_held, few_frames, no_arm, two_people], ids=lambda f: f.__name__
+)
 def test_other_footage_is_refused_with_the_reason(room, fault):
     frames, reason = fault(room)
     with pytest.raises(Unusable, match=reason):
         footage.check(frames)
 
 
+def test_a_camera_that_trembles_is_steadied_with_a_warning(room):
+    film = arms(room, "left")
+    film = np.stack([np.roll(f, s, 1) for f, s in zip(film, [0, 3, 5, 3, 0, 5] * 5, strict=True)])
+    frames, warnings = footage.check(film)
+    assert len(warnings) == 1 and "steadied" in warnings[0]
+    right = np.s_[:, :, 100:150]  # where no arm comes
+    assert frames[right].std(0).mean() < 0.5 * film[right].std(0).mean()
+
+
 def test_a_cut_to_another_place_is_no_moving_camera(room):
     film = arms(room, "left")
     title = np.repeat(room[None, 30 : 30 + SIZE[0], 90 : 90 + SIZE[1]], 12, axis=0)
-    assert footage.check(np.concatenate([title, film]), cuts=(12,)) == []
-    with pytest.raises(Unusable, match="the camera moves"):
-        footage.check(np.concatenate([title, film]))
+    assert footage.check(np.concatenate([title, film]), cuts=(12,))[1] == []
 
 
 def moving(*boxes):
@@ -114,21 +140,6 @@ def test_an_arm_in_pieces_is_one():
     assert not footage._two_arms(moving(*pieces))
 
 
-@pytest.mark.parametrize(
-    ("steady", "said"), [(0.9, []), (0.85, ["The camera seems to move a little"]), (0.7, None)]
-)
-def test_a_camera_that_moves_a_little_is_warned_of_and_more_is_refused(
-    room, steady, said, monkeypatch
-):
-    monkeypatch.setattr(footage, "steadiness", lambda still, background: steady)
-    if said is None:
-        with pytest.raises(Unusable, match="the camera moves"):
-            footage.check(arms(room, "left"))
-    else:
-        notes = footage.check(arms(room, "left"))
-        assert [note.partition(";")[0] for note in notes] == said
-
-
 @pytest.mark.parametrize(("share", "two"), [(0.15, False), (0.25, True)])
 def test_two_arms_in_a_fifth_of_the_frames_are_two_people(room, share, two, monkeypatch):
     asked = iter(np.arange(1000) % 100 < 100 * share)
@@ -136,9 +147,9 @@ def test_two_arms_in_a_fifth_of_the_frames_are_two_people(room, share, two, monk
     film = arms(room, "left", frames=60)
     still = np.zeros((103, 84, 84), np.float32)  # a hundred steps of three frames
     monkeypatch.setattr(footage, "before_background", lambda frames: (still, still[0], True))
-    monkeypatch.setattr(footage, "steadiness", lambda *_: 1.0)
+    monkeypatch.setattr(footage, "_comes_in", lambda moves: True)
     if two:
-        with pytest.raises(Unusable, match="several people"):
+        with pytest.raises(Unusable, match="two arms"):
             footage.check(film)
     else:
-        assert footage.check(film) == []
+        assert footage.check(film)[1] == []

@@ -22,7 +22,7 @@ def clip():
     for frame, (x, y), (bx, by) in zip(frames, hand.astype(int), box.astype(int), strict=True):
         cv2.rectangle(frame, (bx - 8, by - 8), (bx + 8, by + 8), (200, 40, 30), -1)
         cv2.circle(frame, (bx, by), 4, (240, 240, 60), -1)
-        cv2.rectangle(frame, (0, y - 6), (x, y + 6), (40, 60, 110), -1)
+        cv2.rectangle(frame, (x - 6, 0), (x + 6, y), (40, 60, 110), -1)
         cv2.circle(frame, (x, y), 7, (220, 170, 140), -1)
     return frames, hand, box
 

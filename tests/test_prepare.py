@@ -45,7 +45,7 @@ def a_short_film(monkeypatch):
 @pytest.fixture
 def eyes(filmed, monkeypatch):
     """A detector that is told the truth; what it says can be set."""
-    monkeypatch.setattr(prepare, "look", lambda frames: eyes.found)
+    monkeypatch.setattr(prepare, "look", lambda frames, cuts: eyes.found)
     eyes.found = filmed[1]
     return eyes
 
