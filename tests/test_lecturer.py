@@ -371,5 +371,19 @@ def test_a_download_from_canvas_is_graded_into_its_gradebook(tmp_path):
     assert item["submissions"] == "2" and (tmp_path / "out" / "alike.html").exists()
 
 
+def test_a_fault_in_a_report_costs_no_grade(tmp_path, monkeypatch, capsys):
+    def breaks(*_):
+        raise RecursionError("a bug of ours")
+
+    monkeypatch.setattr(alike, "compare", breaks)
+    for name in ("ann", "bob"):
+        (tmp_path / "class" / name).mkdir(parents=True)
+        (tmp_path / "class" / name / "06_reward.ipynb").write_text(notebook())
+    assert main([str(tmp_path / "class"), "--out", str(tmp_path / "out")]) == 1
+    assert "the reports: NOT WRITTEN, RecursionError" in capsys.readouterr().err
+    table = rows((tmp_path / "out" / "class.csv").read_text())
+    assert {row["6.1"] for row in table} == {f"{E61.points:g}"}
+
+
 def test_one_submission_alone_has_no_statistics():
     assert list(reports([entry("ann")], [record("ann", exercise("6.1", 2))], ["6.1"])) == []

@@ -84,7 +84,11 @@ def main(argv=None) -> int:
     ]
     if not written[0]:
         say(table(grades, ids))
-    written += [keep(args.out / name, data) for name, data in reports(entries, grades, ids)]
+    try:
+        written += [keep(args.out / name, data) for name, data in reports(entries, grades, ids)]
+    except Exception as e:  # a fault in a report costs no grade
+        say(f"{traceback.format_exc()}the reports: NOT WRITTEN, {type(e).__name__}", sys.stderr)
+        written.append(False)
     return 0 if all(written) and not any("failed" in g for g in grades) else 1
 
 

@@ -100,13 +100,13 @@ def _compare_one(class_: Class, exercise: Exercise, texts: dict[int, str], pairs
     trees = {number: some for number, some in trees.items() if some}
     n, holders = len(trees), defaultdict(list)
     for number, some in trees.items():
-        for piece in some - kit:
+        for piece in sorted(some - kit):  # in order, or sums would differ from run to run
             holders[piece].append(number)
     weight = {piece: math.log2(n / len(who)) for piece, who in holders.items()}
     times = Counter(trees.values()).values()
     class_.trees[id] = trees
     class_.whole[id] = {
-        number: sum(weight[p] for p in some - kit) for number, some in trees.items()
+        number: sum(weight[p] for p in sorted(some - kit)) for number, some in trees.items()
     }
     class_.chance[id] = sum(k * (k - 1) for k in times) / (n * (n - 1)) if n > 1 else 0.0
     for piece, who in holders.items():

@@ -17,8 +17,6 @@ LONGEST = 3_000  # characters of a call; longer ones nobody reads
 MANY, WIDTH = 500, 88  # numbers of an array, characters of a line
 DIGITS = 2  # of the numbers in it, where it fails with them, too
 DTYPES = ("float64", "int64", "bool")  # what np.array makes of numbers by itself
-
-
 DRAWS, TRIES = 20, 3  # inputs drawn of each check that failed, and how many are tried
 
 
