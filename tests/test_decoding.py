@@ -2,6 +2,7 @@
 
 import os
 import time
+from fractions import Fraction
 from types import SimpleNamespace
 
 import av
@@ -271,3 +272,31 @@ def test_text_in_either_alphabet_is_text_and_noise_is_none():
     assert decoding._is_text(words.encode()) and decoding._is_text(words.encode("utf-16"))
     noise = np.random.default_rng(0).integers(0, 256, 800, np.uint8).tobytes()
     assert not decoding._is_text(noise)
+
+
+class Packet:
+    """A packet of the film, of 0.04 s, with frames of which some are corrupt, or none at all."""
+
+    time_base, duration, size, is_keyframe = Fraction(1, 25), 1, 10, True
+
+    def __init__(self, pts, *corrupt, stream=0, error=False):
+        self.pts, self.stream, self.error = pts, SimpleNamespace(index=stream), error
+        self.frames = [SimpleNamespace(is_corrupt=bad, pts=pts) for bad in corrupt]
+
+    def decode(self):
+        if self.error:
+            raise av.FFmpegError(1, "damaged")
+        return self.frames
+
+
+def test_what_is_damaged_is_left_out_and_counted_and_sound_only_measured():
+    stream = SimpleNamespace(index=0)
+    packets = [
+        Packet(0, False), Packet(1, True, False), Packet(2, error=True), Packet(90, stream=1),
+        Packet(3, False),
+    ]  # fmt: skip
+    decoder = Decoder("film", stream)
+    container = SimpleNamespace(start_time=None, demux=lambda: iter(packets))
+    kept = [frame.pts for frame in decoder._decoded(container, stream)]
+    assert kept == [0, 1, 3] and decoder.bad == 2 and decoder.packets == 4
+    assert decoder.covered == pytest.approx(91 / 25)

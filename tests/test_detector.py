@@ -271,6 +271,16 @@ def test_a_picture_is_fitted_in_the_middle_between_two_bars():
     assert (upright[0, :, 28:56] == 200).all() and corner.tolist() == [28, 0]
 
 
+def test_places_come_back_by_the_scale_of_each_axis(monkeypatch):
+    """200 x 10 pixels become 84 x 4, from row 40 on: 0.42 and 0.4 of them."""
+    places = torch.tensor([[[42.0, 42.0], [84.0, 44.0]]] * 2)
+    monkeypatch.setattr(detector, "both_ways", lambda network, images: images)
+    monkeypatch.setattr(detector, "read", lambda logits: (places, torch.ones(2, 2)))
+    found, sure = Detector(Network())._look(np.zeros((2, 10, 200, 3), np.uint8))
+    np.testing.assert_allclose(found[0], [[100, 5], [200, 10]], rtol=1e-5)
+    assert (sure == 1).all()
+
+
 def test_the_second_look_takes_in_what_was_found_and_stays_within_the_picture():
     """Places from 20 to 60 along x: half as much again, and 0.3 of the longer side."""
     x = np.linspace(20, 60, 101)

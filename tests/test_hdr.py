@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from av.video.reformatter import ColorTrc
 from toy_clips import encode
 
 from lbw_minimal.clips import hdr
@@ -21,6 +22,13 @@ from lbw_minimal.clips.reader import read_clip
 )
 def test_curves_meet_the_standards_levels(curve, signal, light):
     assert curve(np.float64(signal)) == pytest.approx(light, rel=0.02)
+
+
+def test_the_curves_are_called_as_files_call_them():
+    """ITU-T H.273's numbers, as FFmpeg has them, too."""
+    assert (hdr.HLG, hdr.PQ) == (18, 16)
+    names = {name: int(value) for name, value in ColorTrc.__members__.items()}
+    assert (names["ARIB_STD_B67"], names["SMPTE2084"]) == (hdr.HLG, hdr.PQ)
 
 
 def test_both_pieces_of_hlg_meet():
