@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from lbw_minimal.clips import hdr
 from lbw_minimal.clips.decoding import Stream
 from lbw_minimal.clips.upright import SIDE, WHOLE, Upright, _inner, borders
 
@@ -127,3 +128,18 @@ def test_a_soft_edge_is_part_of_the_border():
     share = np.ones((3, 100))
     share[:, :10], share[:, 10:12] = 0, 0.3
     assert _inner(share) == (12, 100)
+
+
+def test_white_is_that_of_the_first_frame_that_is_not_black(monkeypatch):
+    """Exposure that followed each frame would flicker; a film may fade in from black."""
+    lights = iter([0.05, 1.0, 9.0, 9.0])
+    monkeypatch.setattr(hdr, "screen_light", lambda signal, transfer: np.full(3, next(lights)))
+    monkeypatch.setattr(hdr, "white_of", lambda light: 2 * light.max())
+    monkeypatch.setattr(hdr, "tone_map", lambda light, white: white)
+    up = Upright(stream(6, 4))
+    up._scaler = SimpleNamespace(
+        reformat=lambda frame, **how: SimpleNamespace(to_ndarray=lambda: how["format"])
+    )
+    whites = [up._tone_mapped(SimpleNamespace(color_trc=t), {}) for t in (18, 18, 18, 16)]
+    assert whites == pytest.approx([0.1, 2.0, 2.0, 2.0])
+    assert [note[:9] for note in up.notes] == ["HDR (HLG)", "HDR (PQ) "]
