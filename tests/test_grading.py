@@ -28,6 +28,7 @@ from tests.grade.__main__ import main, safe
 from tests.grade.cell.answer import STUB
 from tests.grade.cell.walls import has_landlock
 from tests.grade.exercise import Exercise, find
+from tests.grade.files import File
 from tests.grade.judge import _questions
 from tests.grade.sandbox import Sandbox
 from tests.grade.submission import Answer
@@ -36,6 +37,7 @@ ROOT = Path(__file__).resolve().parent.parent
 SOURCE = ROOT / "solutions" / "06_reward.ipynb"
 SOLVED = json.loads(SOURCE.read_text())
 E61 = find("6.1")
+REWARD = [f"6.{i}" for i in range(1, 6)]
 REST = sum(find(f"6.{i}").points for i in (2, 3, 4, 5))
 RIGHT = E61.source
 NEEDS = RIGHT.replace("    return", "    got\n    return")  # what it could not get hold of
@@ -474,6 +476,39 @@ def test_one_submission_is_a_job_of_its_own(tmp_path):
         "ann": (E61.points, REST),
         "06_reward.ipynb": (E61.points, REST),
     }
+
+
+def opened(monkeypatch):
+    """The ids of exercises in the order in which processes are started for them."""
+    ids, start = [], Sandbox.open
+
+    def noted(box, exercise, *args, **how):
+        ids.append(exercise.id)
+        return start(box, exercise, *args, **how)
+
+    monkeypatch.setattr(Sandbox, "open", noted)
+    return ids
+
+
+def test_a_right_answer_is_repeated_in_the_next_ones_process(monkeypatch):
+    ids = opened(monkeypatch)
+    results, _ = grading.grade([File("06_reward.ipynb", json.dumps(SOLVED).encode())], REWARD)
+    assert sum(r.points for r in results) == FULL
+    assert ids == [*REWARD, "6.5"]
+
+
+def test_an_answer_that_spoils_its_process_costs_no_other_exercise(monkeypatch):
+    """6.2 is right, and leaves numpy broken when it is called: 6.1 is repeated elsewhere."""
+    notebook = answered(RIGHT)
+    spoilt = find("6.2").source.replace("return ", "value = ").rstrip()
+    spoilt += "\n    np.sqrt = lambda x: x * 0\n    return value\n"
+    spoilt = "import numpy as np\nroot = np.sqrt\n" + spoilt.replace("np.sqrt(", "root(")
+    cell_of(notebook, "ex-6-2")["source"] = spoilt
+    ids = opened(monkeypatch)
+    file = File("06_reward.ipynb", json.dumps(notebook).encode())
+    results, _ = grading.grade([file], ["6.1", "6.2"])
+    assert [r.points for r in results] == [r.most for r in results]
+    assert ids.count("6.1") == 3  # judged; judged again, and then repeated, by processes of its own
 
 
 def test_what_breaks_the_grader_costs_one_submission_and_is_told(tmp_path, monkeypatch, capsys):

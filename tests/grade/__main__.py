@@ -212,6 +212,8 @@ def grade(
     if not files:
         notes.append("no notebook found; an archive has to be unpacked first")
     known, results, left = everything(), [], float(sandbox.SUBMISSION)
+    answers: dict[str, Answer] = {}
+    later = Repeats()
     twice: dict[tuple[str, str], list[str]] = {}
     for id in ids:
         given = answer(known[id], books)
@@ -221,8 +223,13 @@ def grade(
         if given.elsewhere:
             twice.setdefault((given.elsewhere, given.where), []).append(id)
         box.start()
+        answers[id] = given
         began = time.monotonic()
-        results.append(grade_one(known[id], given, box, seed, left))
+        results.append(grade_one(known[id], given, box, seed, left, later))
+        left -= time.monotonic() - began
+    for id in later.doubted(box):
+        began = time.monotonic()
+        results[ids.index(id)] = grade_one(known[id], answers[id], box, seed, left)
         left -= time.monotonic() - began
     for (other, taken), some in twice.items():
         stand = "stand" if some[1:] else "stands"
@@ -248,12 +255,51 @@ def _not_set(books: list[Notebook], ids: list[str]) -> list[str]:
     return sorted(worked, key=int)
 
 
+class Repeats:
+    """Right answers that have yet to be given once more by a process that was not asked before.
+
+    To start one takes longer than most answers. So an answer is repeated in the process of the
+    student's next exercise, when that has been judged: nothing can be gained there any more. Where
+    it fails the other exercise may be the reason, and it is graded in processes of its own.
+    """
+
+    def __init__(self):
+        self.waiting: list[tuple] = []  # (exercise, how to define the answer, what has to agree)
+        self.failed: list[str] = []
+
+    def settle(self, define, box: Sandbox) -> None:
+        """Repeat those that wait. define: `box.open` or `box.reopen`."""
+        while self.waiting:
+            exercise, (cells, how), agrees = self.waiting.pop()
+            try:
+                if define(exercise, *cells, **how) is None and agrees(box.call):
+                    continue
+            except Lost:
+                pass
+            finally:
+                define = box.reopen if box.channel else box.open
+            self.failed.append(exercise.id)
+
+    def doubted(self, box: Sandbox) -> list[str]:
+        """Repeat the rest; the ids of all that failed."""
+        box.allow(sandbox.EXERCISE)
+        self.settle(box.open, box)
+        box.close()
+        return list(dict.fromkeys(self.failed))
+
+
 def grade_one(
-    exercise: Exercise, given: Answer, box: Sandbox, seed: int = 0, seconds: float = math.inf
+    exercise: Exercise,
+    given: Answer,
+    box: Sandbox,
+    seed: int = 0,
+    seconds: float = math.inf,
+    later: Repeats | None = None,
 ) -> Result:
     """The result of one answer, run in the sandbox; the best, where there are several.
 
-    seconds: what is left for the submission, see `sandbox.SUBMISSION`.
+    seconds: what is left for the submission, see `sandbox.SUBMISSION`. later: where what was right
+    is put to be repeated; else that is done at once.
     """
     if given.open:
         return nothing(exercise, UNDONE, open=True)
@@ -265,21 +311,31 @@ def grade_one(
     ways = [
         (a, over) for a in (given, *given.others) for over in ((True, False) if a.own else (False,))
     ]
-    return best(lambda a=a, over=over: in_sandbox(exercise, a, over, box, seed) for a, over in ways)
+    return best(
+        lambda a=a, over=over: in_sandbox(exercise, a, over, box, seed, later) for a, over in ways
+    )
 
 
-def in_sandbox(exercise: Exercise, given: Answer, over: bool, box: Sandbox, seed: int) -> Result:
+def in_sandbox(
+    exercise: Exercise, given: Answer, over: bool, box: Sandbox, seed: int, later: Repeats | None
+) -> Result:
     """The result of one cell. over: with the exercise's `given` in place of what the student wrote
-    by these names."""
+    by these names. later: see `grade_one`."""
+    cells = (given.source, given.helpers, given.below)
     how = {"over": over, "definitions_only": False}
+    right = []
 
     def start():
         box.close()
-        return box.open(exercise, given.source, given.helpers, given.below, **how)
+        return box.open(exercise, *cells, **how)
 
-    def renew():
+    def renew(agrees):
+        if later:
+            right.append((exercise, (cells, how), agrees))
+            return ""
         if start() is not None:
-            raise Lost("the cell runs once, but not a second time")
+            return "the cell runs once, but not a second time"
+        return "" if agrees(box.call) else "the same input gives another answer after other inputs"
 
     try:
         try:
@@ -290,7 +346,12 @@ def in_sandbox(exercise: Exercise, given: Answer, over: bool, box: Sandbox, seed
         if failed is not None:
             why = f"the cell does not run: {failed.in_full()}" if failed.text else f"{failed}"
             return nothing(exercise, why)
-        return judge(exercise, box.call, seed, renew)
+        result = judge(exercise, box.call, seed, renew)
+        if later and box.channel:
+            later.settle(box.reopen, box)
+        if later:
+            later.waiting += right
+        return result
     except Lost as e:
         return nothing(exercise, str(e))
     finally:

@@ -89,8 +89,9 @@ def best(ways: Iterable[Callable[[], Result]]) -> Result:
 def judge(exercise: Exercise, call, seed: int = 0, renew=None) -> Result:
     """Run all checks of an exercise on the answer behind call(args) -> (value, changed its inputs).
 
-    renew() starts that answer afresh, as if it had never been called. A call that raises Lost ends
-    the exercise: what was earned before stays. An answer that is the same for all inputs earns
+    renew(agrees) has agrees(call) tried on that answer afresh, as if it had never been called, and
+    returns what is to be said against it. A call that raises Lost ends the exercise: what was
+    earned before stays. An answer that is the same for all inputs earns
     nothing, also where it happens to be right; nor does one that hangs on what it was asked before.
     The order of the questions hangs on the seed, so that counting them helps nobody.
     """
@@ -279,9 +280,7 @@ def _repeat(known, call, renew) -> str:
         if not _agrees(known[0], call):
             return "the same input gives another answer the second time"
         if renew:
-            renew()
-            if not all(_agrees(pair, call) for pair in reversed(known)):
-                return "the same input gives another answer after other inputs"
+            return renew(lambda call: all(_agrees(pair, call) for pair in reversed(known)))
     except Lost as e:
         return str(e)
     return ""

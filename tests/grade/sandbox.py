@@ -212,12 +212,10 @@ class Sandbox:
         helpers, below: see `Answer`. how: over and definitions_only, see `define`.
         """
         self.start()
-        job = {"source": source, "helpers": list(helpers), "below": list(below)}
-        job |= {"name": exercise.name, "given": exercise.given, "probe": exercise.probe}
-        job |= {"memory": MEMORY, "cpu": CPU, "over": False, "definitions_only": False} | how
+        job = wire.encode(_job(exercise, source, helpers, below, how))
         try:
             self.control.settimeout(WALL)
-            wire.send(self.control, wire.encode(job))
+            wire.send(self.control, job)
             _, (fd,), _, _ = socket.recv_fds(self.control, 1, 1)
         except (OSError, ValueError):
             self.kill()
@@ -225,6 +223,22 @@ class Sandbox:
         self.channel = socket.socket(fileno=fd)
         if (confined := self._answer()) != "confined":  # said before the student's first line
             raise RuntimeError(str(confined))
+        return self._defined()
+
+    def reopen(
+        self, exercise: Exercise, source: str, helpers: list, below: list = (), **how: bool
+    ) -> wire.Raised | None:
+        """As `open`, in the process that is there: for another answer of the same student."""
+        job = wire.encode(_job(exercise, source, helpers, below, how))
+        try:
+            self.channel.settimeout(self._seconds())
+            wire.send(self.channel, b"")
+            wire.send(self.channel, job)
+        except OSError:
+            raise self._lost(ENDED) from None
+        return self._defined()
+
+    def _defined(self) -> wire.Raised | None:
         failed = self._answer()
         if failed is not None and type(failed) is not wire.Raised:
             raise self._lost(NO_ANSWER)
@@ -277,6 +291,12 @@ class Sandbox:
         except Lost as e:
             slow = time.monotonic() >= self.until
             raise self._lost(self.allowed if slow else str(e)) from None
+
+
+def _job(exercise: Exercise, source: str, helpers: list, below: list, how: dict) -> dict:
+    job = {"source": source, "helpers": list(helpers), "below": list(below)}
+    job |= {"name": exercise.name, "given": exercise.given, "probe": exercise.probe}
+    return job | {"memory": MEMORY, "cpu": CPU, "over": False, "definitions_only": False} | how
 
 
 def _receive(channel: socket.socket, seconds: float, most: int = wire.MOST) -> bytes:

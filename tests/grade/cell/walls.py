@@ -63,6 +63,25 @@ def _function(name: str):
     return function
 
 
+HUGE, COLLAPSE = 2 << 20, 25  # bytes of a huge page; MADV_COLLAPSE, of Linux 6.1 and later
+
+
+def gather_memory() -> None:
+    """Put this process's memory on huge pages, where the kernel can.
+
+    A fork copies an entry for every page, and its end clears them: with 300 MB on pages of 4 kB
+    both take longer than most answers.
+    """
+    with open("/proc/self/maps") as f:
+        lines = [line.split() for line in f]
+    for place, rights, _, _, _, *name in lines:
+        if "w" in rights and name in ([], ["[heap]"]):
+            start, end = (int(x, 16) for x in place.split("-"))
+            for at in range(-(-start // HUGE) * HUGE, end - HUGE + 1, HUGE):
+                with contextlib.suppress(OSError):
+                    _libc("madvise", at, HUGE, COLLAPSE)
+
+
 CREATE_RULESET, ADD_RULE, RESTRICT_SELF = 444, 445, 446
 EVERY_ACCESS = (1 << 13) - 1  # all that Landlock's first version knows: execute, write, read ...
 READ_FILE, READ_DIR = 1 << 2, 1 << 3
