@@ -60,10 +60,11 @@ def paths_of(*ends, rest=5, T=20):
 
 
 def test_the_object_is_what_rests_first_moves_later_and_was_kept():
-    paths = paths_of((9, 0), (9, 0.2), (0, 0), (9, 0), (9, 0))
+    paths = paths_of((9, 0), (9, 0.2), (0, 0), (9, 0), (9, 0), *[(40, 0)] * 3)
     paths[1:, 3] = paths[-1, 3]  # moves from the start, as a hand does
-    kept = np.array([True, True, True, True, False])
-    assert tracks.object_points(paths, kept).tolist() == [True, True, False, False, False]
+    paths[-1, 5:] = paths[0, 5:]  # goes farthest and comes back, as a lamp does
+    kept = np.array([True, True, True, True, False, True, True, True])
+    assert tracks.object_points(paths, kept).tolist() == [True, True, *[False] * 6]
 
 
 def test_of_two_groups_the_one_that_has_come_farther_is_the_object():
@@ -90,10 +91,10 @@ def test_the_objects_pixels_and_the_side_it_is_pushed_from_are_found():
 
 
 def test_a_background_is_seen_through_what_stands_before_it_for_most_of_a_film():
-    """For 60 of 100 frames an arm covers the wall, with many colours; the median shows the arm."""
+    """For 65 of 100 frames an arm covers the wall, with many colours; the median shows the arm."""
     rng = np.random.default_rng(0)
     film_ = np.full((100, 84, 84, 3), 150, np.uint8)
-    film_[:60, 20:40] = rng.integers(180, 255, (60, 1, 1, 1))
+    film_[:65, 20:40] = rng.integers(180, 255, (65, 1, 1, 1))
     assert np.median(film_, axis=0)[30, 30, 0] > 180
     assert (tracks.background(film_) == 150).all()
 
@@ -102,7 +103,7 @@ def arm_scene(tip):
     """An arm 6 pixels wide that comes in from above and ends at row `tip`, and a speck."""
     frame = np.full((84, 84, 3), 150, np.uint8)
     frame[:tip, 20:26] = 230
-    frame[60:63, 60:63] = 230
+    frame[60:63, 30:33] = 230
     return frame
 
 
@@ -144,6 +145,26 @@ def test_a_lost_point_waits_where_the_others_are_and_is_found_again():
         np.testing.assert_allclose(seen.d, d[t], atol=0.5)
         fewest = min(fewest, seen.kept.sum())
     assert fewest < len(seen.p) and seen.kept.sum() > fewest
+
+
+def test_a_dragged_point_has_no_say_and_waits_with_the_lost_ones(monkeypatch):
+    """Five points: three go by (4, 0), one is dragged by (9, 9), one is lost. Next time each is
+    looked for where it would be after as much again."""
+    seen = tracker(ways()[0])
+    seen.reset(ways()[0][0])
+    seen.p_0 = seen.p = np.array([[10.0 * k, 20.0] for k in range(5)])
+    moves, asked = np.array([[4.0, 0], [4, 0], [4, 0], [9, 9], [70, 0]]), []
+
+    def flow(frame, following, points, guess):
+        asked.append((points, guess))
+        return points + moves, np.array([True] * 4 + [False])
+
+    monkeypatch.setattr(tracks, "flow", flow)
+    seen.step(ways()[0][1])
+    assert seen.d.tolist() == [4, 0] and seen.kept.tolist() == [True] * 3 + [False] * 2
+    np.testing.assert_array_equal(seen.p, seen.p_0 + (4, 0))
+    seen.step(ways()[0][1])
+    np.testing.assert_array_equal(asked[1][1], seen.p_0 + (8, 0))
 
 
 def test_an_object_that_is_wholly_hidden_rests_where_it_was_seen_last():
