@@ -104,16 +104,22 @@ class Path:
 
 
 def mended(frames: np.ndarray, found: Found, cuts: Sequence[int] = ()) -> Found:
-    """Found, with the object's path that of the best patch in each shot.
+    """Found, in each shot with the path of the best patch where the object's does not move as one.
 
-    cuts: frames with which a new shot begins. Where no patch moves as an object does, the detector
-    is believed, unless most of what it saw rests: then nothing moves.
+    cuts: frames with which a new shot begins. Where no patch moves as an object does either, the
+    detector is believed, unless most of what it saw rests: then nothing moves.
     """
     places, sure = found.object.copy(), found.object_sure.copy()
     for first, last in pairwise([0, *cuts, len(frames)]):
         part = Found(*(getattr(found, name)[first:last] for name in vars(found)))
-        k, scale, some = paths(frames[first:last], part)
-        best = chosen(some)
+        k = np.unique(np.linspace(0, last - first - 1, LOOK_AT).round().astype(int))
+        scale = min(1.0, SMALL / max(frames.shape[1:3]))
+        tip = _tip(part, k, scale)
+        side = round(min(frames.shape[1:3]) * scale)
+        own = Path(part.object[k] * scale, part.object_sure[k], tip, side)
+        if own.seen and own.pushed:
+            continue
+        best = chosen(paths(frames[first:last][k], _seen(part, k, scale), tip, scale))
         if best is not None:
             along = np.arange(last - first)
             for axis in (0, 1):
@@ -134,24 +140,24 @@ def chosen(some: list[Path]) -> Path | None:
     return max(still, key=lambda path: path.worth) if len(still) > len(some) / 2 else None
 
 
-def paths(frames: np.ndarray, found: Found) -> tuple[np.ndarray, float, list[Path]]:
-    """The frames (n,) that are looked at, small pixels in a pixel, and the paths of the patches."""
-    k = np.unique(np.linspace(0, len(frames) - 1, LOOK_AT).round().astype(int))
-    scale = min(1.0, SMALL / max(frames.shape[1:3]))
+def paths(
+    frames: np.ndarray, places: list[tuple[int, np.ndarray]], tip: np.ndarray | None, scale: float
+) -> list[Path]:
+    """The paths of patches in the frames (n, H, W, 3) uint8: of those about places, (frame, (2,)),
+    in pixels of frames that are so much smaller, and of what is gone in the end."""
     size = round(frames.shape[2] * scale), round(frames.shape[1] * scale)
     small = [
-        cv2.GaussianBlur(cv2.resize(frames[t], size, interpolation=cv2.INTER_AREA), (3, 3), 0)
-        for t in k
+        cv2.GaussianBlur(cv2.resize(frame, size, interpolation=cv2.INTER_AREA), (3, 3), 0)
+        for frame in frames
     ]
-    tip, out = _tip(found, k), []
-    tip = None if tip is None else tip * scale
-    for i, middle in [*_seen(found, k, scale), *_left(small)]:
+    out = []
+    for i, middle in [*places, *_left(small)]:
         for half in HALVES if min(size) > 3 * max(HALVES) else ():
             x, y = np.clip(np.round(middle).astype(int), half, np.array(size) - half - 1)
             patch = small[i][y - half : y + half + 1, x - half : x + half + 1]
             if patch.std() > PLAIN:
                 out.append(_path(small, patch, tip))
-    return k, scale, out
+    return out
 
 
 def _seen(found, k, scale):
@@ -177,13 +183,13 @@ def _left(small):
     return [(0, middle) for _, middle in things[:LEFT]]
 
 
-def _tip(found, k):
+def _tip(found, k, scale):
     """Where the tip (n, 2) is in frames k, between those in which it is surely seen; None if
     these are few."""
     sure = np.flatnonzero(found.tip_sure > SURE)
     if len(sure) < KNOWN * len(found.tip_sure):
         return None
-    return np.stack([np.interp(k, sure, found.tip[sure, axis]) for axis in (0, 1)], 1)
+    return scale * np.stack([np.interp(k, sure, found.tip[sure, axis]) for axis in (0, 1)], 1)
 
 
 def _path(small, patch, tip):
