@@ -183,7 +183,8 @@ def thing(kind, layer, at, half, colours, seed):
     elif kind == "car":
         poly(layer, rectangle(x - a, y - 0.1 * b, x + a, y + 0.7 * b), main)
         poly(layer, np.array([(x - 0.6 * a, y - 0.1 * b), (x - 0.35 * a, y - b),
-                              (x + 0.4 * a, y - b), (x + 0.7 * a, y - 0.1 * b)]), second)  # fmt: skip
+                              (x + 0.4 * a, y - b), (x + 0.7 * a, y - 0.1 * b)]),
+             second)  # fmt: skip
         for side in (-0.55, 0.55):
             poly(layer, ellipse((x + side * a, y + 0.65 * b), 0.25 * a, 0.35 * b), (30, 30, 32))
     elif kind == "fruit":

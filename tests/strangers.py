@@ -1,6 +1,6 @@
 """Clips of strangers, each with the verdict that a person would give it: a trial for `prepare`.
 
-    python -m tests.strangers --seed 1 --count 60      # a table of verdicts, and those that are wrong
+    python -m tests.strangers --seed 1 --count 60      # each verdict, and how many are right
 
 Half of the usable ones are painted (`strange_rooms.py`), half filmed in the simulator with another
 person, room, light and camera. Frame rates, codecs, noise, flicker, cuts and shake are a phone's.
@@ -218,7 +218,7 @@ def _pictures(rng, task, kind, size, told):
     name = "mug" if task == "coffee" else name
     shoulder = np.array([w / 2 - d * w / MARGIN * rng.uniform(0.62, 0.75),
                          h / 2 + u * rng.uniform(-0.55, 0.1)])  # fmt: skip
-    room = _furniture(rng, task, room, (tip, thing, half, d, u, table))
+    room = _furniture(rng, task, room, (thing, half, d, u, table))
     other = paint.Person(rng) if kind == "two people" else None
     lamp = rng.uniform(0.1, 0.9) * w if rng.random() < 0.12 and kind != "still" else None
     swing, shade = rng.uniform(5, 20), rng.uniform(0.1, 0.45)
@@ -235,8 +235,8 @@ def _pictures(rng, task, kind, size, told):
             at = tip[t] + (0.3 * d * u, 0) * np.array(hides)
             person.draw(limb, at, shoulder + 0.3 * (tip[t] - tip[-1]), u)
             if hides:
-                paint.stick(limb, shoulder, thing[t] + (1.5 * d * half[0], 0), 0.1 * u, 2.2 * half.max(),
-                            person.cloth)  # fmt: skip
+                before = thing[t] + (1.5 * d * half[0], 0)
+                paint.stick(limb, shoulder, before, 0.1 * u, 2.2 * half.max(), person.cloth)
             dark = cv2.GaussianBlur(np.roll(limb[1], round(0.05 * u), 0), (0, 0), 0.03 * u)
             room_t = room * (1 - shade * dark[..., None])
         else:
@@ -260,7 +260,7 @@ def _pictures(rng, task, kind, size, told):
 
 def _furniture(rng, task, room, told):
     """The room with what stands at the end of the way."""
-    tip, thing, half, d, u, table = told
+    thing, half, d, u, table = told
     layer, ink = paint.empty(*room.shape[:2]), paint.tone(rng, 30, 200, 25)
     end = thing[-1]
     if task == "coffee":

@@ -92,10 +92,10 @@ class Path:
             return False
         return bool(steps.sum() < TO_AND_FRO * way and steps.max() < LEAPS * way)
 
-    def agrees(self, other: Path) -> bool:
-        """Whether another patch goes the same way, beside it."""
+    def agrees(self, other: Path, share: float = 0.5) -> bool:
+        """Whether another patch goes the same way, beside it, in that share of the frames."""
         off = self.places - other.places
-        return bool(np.median(np.abs(off - np.median(off, axis=0)).max(1)) < APART)
+        return bool(np.quantile(np.abs(off - np.median(off, axis=0)).max(1), share) < APART)
 
     @property
     def worth(self) -> float:
@@ -120,7 +120,7 @@ def mended(frames: np.ndarray, found: Found, cuts: Sequence[int] = ()) -> Found:
         if own.seen and own.pushed:
             continue
         best = chosen(paths(frames[first:last][k], _seen(part, k, scale), tip, scale))
-        if best is not None:
+        if best is not None and not best.agrees(own, 0.9):  # a patch is known to a pixel only
             along = np.arange(last - first)
             for axis in (0, 1):
                 places[first:last, axis] = np.interp(along, k, best.places[:, axis] / scale)
@@ -195,7 +195,7 @@ def _tip(found, k, scale):
 def _path(small, patch, tip):
     peaks = [_peaks(cv2.matchTemplate(one, patch, cv2.TM_CCOEFF_NORMED)) for one in small]
     cost, back = [1 - peaks[0][1]], []
-    for (before, _), (here, alike) in zip(peaks[:-1], peaks[1:], strict=True):
+    for (before, _), (here, alike) in pairwise(peaks):
         far = np.linalg.norm(here[:, None] - before[None], axis=2)  # (here, before)
         total = cost[-1][None] + STRAY * (far / LEAP) ** 2
         back.append(total.argmin(1))
