@@ -168,6 +168,18 @@ def test_where_the_object_starts_makes_no_difference_to_what_is_seen_of_its_way(
     np.testing.assert_allclose(seen[0][1], seen[1][1], atol=0.05)
 
 
+def test_an_object_that_starts_ahead_is_seen_to_go_as_much_of_its_shorter_way():
+    """16.5 pixels in the demonstration. 3 ahead there are 13.5, so a step counts 16.5 / 13.5."""
+    wall = np.full((84, 84, 3), (120.0, 130.0, 150.0))
+    path, d = ways(pace=(1.5, 0.0))
+    shown = tracks.watch(path)
+    tracker = tracks.Tracker(shown, wall.astype(np.uint8))
+    frames = np.stack([scene(HERE + (3, 0) + x, wall) for x in d])
+    seen, _ = play(TrackWrapper(Film(frames), tracker, TrackReward(shown.path)))
+    np.testing.assert_allclose(42 * seen[:, 0], 16.5 / 13.5 * d[:19, 0], atol=0.3)
+    assert 42 * seen[-1, 0] > d[18, 0] + 1
+
+
 def test_an_episode_that_the_task_ends_is_cut_and_never_terminal():
     env = wrapped(ways()[0], ends=3)
     env.reset(seed=0)
