@@ -9,6 +9,8 @@ room is so bare that nothing tells, the camera is taken to stand.
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
 
@@ -82,7 +84,7 @@ def _followed(one, two, corners, step):
     if not len(corners):
         return corners[:, 0], corners[:, 0]
     guess = cv2.transform(corners, np.linalg.inv(step)[:2]).astype(np.float32)
-    how = dict(winSize=WINDOW, flags=cv2.OPTFLOW_USE_INITIAL_FLOW)
+    how: dict[str, Any] = {"winSize": WINDOW, "flags": cv2.OPTFLOW_USE_INITIAL_FLOW}
     there, ok, _ = cv2.calcOpticalFlowPyrLK(one, two, corners, guess, **how)
     back, ok_back, _ = cv2.calcOpticalFlowPyrLK(two, one, there, corners.copy(), **how)
     kept = (np.hstack([ok, ok_back]) > 0).all(1)
