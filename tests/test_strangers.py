@@ -10,7 +10,8 @@ from tasks.commands.prepare import prepare
 from tests.strangers import FAULTS, judged, stranger, trial
 
 DEVELOPED = 2  # the seed with which prepare was mended
-RIGHT = 0.70  # of sixty; the goal is 0.95
+HELD_BACK, COUNT = 21, 36
+RIGHT = 0.65  # measured: 26 of 36; the goal is 0.95
 
 
 @pytest.mark.parametrize(
@@ -39,5 +40,5 @@ def test_a_verdict_is_right_if_its_reason_is():
 
 @pytest.mark.slow
 def test_most_verdicts_on_clips_of_strangers_are_right():
-    told = trial(DEVELOPED, 60, show=lambda *line, **how: None)
+    told = trial(HELD_BACK, COUNT, show=lambda *line, **how: None)
     assert np.mean([judged(*pair) for pair in told]) >= RIGHT
