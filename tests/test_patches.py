@@ -73,6 +73,7 @@ def a_path(x, tip):
 
 
 MOVES = np.interp(np.arange(40), [20, 35], [40, 90])  # after the hand has come
+SWINGS = 60 - 20 * np.cos(0.7 * np.maximum(0, np.arange(40) - 20))
 HAND = np.interp(np.arange(40), [0, 20, 35], [0, 38, 88])
 
 
@@ -84,7 +85,7 @@ HAND = np.interp(np.arange(40), [0, 20, 35], [0, 38, 88])
         (a_path(HAND + 5, HAND), False),  # a sleeve
         (a_path(MOVES + 200, HAND), False),  # nobody is near
         (a_path(np.where(np.arange(40) < 20, 40.0, 90.0), HAND), False),  # taken for another
-        (a_path(np.where(np.arange(40) < 20, 40, 60 + 20 * np.sin(np.arange(40))), HAND), False),
+        (a_path(SWINGS, HAND), False),
         (a_path(np.full(40, 40.0), HAND), False),
     ],
 )
