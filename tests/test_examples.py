@@ -178,6 +178,17 @@ def test_the_smallest_of_the_inputs_that_fail_is_shown():
     assert len(shown) == min(n for n in drawn if n >= 11)
 
 
+def test_smaller_inputs_than_those_that_were_asked_are_tried_first():
+    check = find("0.1").checks[1]
+    sizes = [example.size(args) for _, args in example.candidates([(check, (np.zeros(40), 0.5))])]
+    assert sizes[0] < sizes[-1] == 41 and sizes == sorted(sizes)
+
+
+def test_what_a_check_asks_by_several_calls_is_not_shown_by_one():
+    assert example.tried(find("10.1"), (3, 7))[1] == "wilson(3, 7)"
+    assert example.tried(find("10.1"), ([0, 5], [5, 5]))[1] == ""
+
+
 def test_where_only_all_digits_fail_they_are_shown():
     exercise = find("7.1")
     source = exercise.source.replace("return", "if v != round(v, 2): v = 2 * v\n    return", 1)
