@@ -139,6 +139,8 @@ GRADIENTS = """
             args[i] = leaves[k]
         found = {{}}
         out = {name}(*args)
+        if not all(leaf.requires_grad for leaf in leaves.values()):
+            raise ValueError("detach_() cuts the caller's own tensor off: detach() makes a new one")
         for j, part in enumerate(out if {several} else [out]):
             if torch.is_tensor(part) and part.requires_grad:
                 # Weighted, or in a sum of many numbers gradients could cancel.

@@ -295,10 +295,15 @@ def ask(probe, request: bytes, catch=Exception):
 
     args = wire.decode(request, torch.from_numpy)
     torch.default_generator.manual_seed(0)  # not those of devices, which take a while
+    trains = torch.is_grad_enabled()
     try:
         value = probe(*args)
     except catch as e:
         return raised(e), False, e
+    if trains and not torch.is_grad_enabled():
+        torch.set_grad_enabled(True)
+        why = "it leaves autograd switched off; `with torch.no_grad():` switches it on again"
+        value = wire.Raised("RuntimeError", why)
     return value, wire.encode(args) != request, None
 
 

@@ -69,6 +69,17 @@ success_rate.mistake(
     "distances < threshold",
     "distances <= threshold",
 )
+success_rate.mistake(
+    "You round: a share of one in three is 0.333..., not 0.3.",
+    "float((distances < threshold).mean())",
+    "round(float((distances < threshold).mean()), 1)",
+)
+success_rate.mistake(
+    "searchsorted counts right only where the distances are sorted: count those below the "
+    "threshold.",
+    "float((distances < threshold).mean())",
+    "float(np.searchsorted(distances, threshold) / len(distances))",
+)
 
 
 @exercise("0.2", "From keypoint to pixel")
@@ -124,4 +135,9 @@ to_pixels.mistake(
     "x comes first in both: column before row.",
     "(z + 1) / 2 * size",
     "(z[..., ::-1] + 1) / 2 * size",
+)
+to_pixels.mistake(
+    "Half of an odd size is no whole number: divide by 2 with /, not with //.",
+    "(z + 1) / 2 * size",
+    "(z + 1) * (size // 2)",
 )

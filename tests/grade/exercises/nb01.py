@@ -49,6 +49,28 @@ def _arm(rng):
     return J, A @ A.T + 7 * np.eye(7)
 
 
+response.mistake(
+    "omega is sqrt(kp), whatever kp is; 20 belongs to kp = 400 alone.",
+    "np.sqrt(kp)",
+    "20",
+)
+response.mistake(
+    "omega need not be a whole number: keep the root as it is.",
+    "np.sqrt(kp)",
+    "int(np.sqrt(kp))",
+)
+response.mistake(
+    "The response is what is left to go; yours is the way that lies behind.",
+    "x0 * (1 + w * t) * np.exp(-w * t)",
+    "x0 - x0 * (1 + w * t) * np.exp(-w * t)",
+)
+response.mistake(
+    "The exponential multiplies the whole bracket, (1 + w t); yours damps w t alone.",
+    "x0 * (1 + w * t) * np.exp(-w * t)",
+    "x0 * (1 + w * t * np.exp(-w * t))",
+)
+
+
 @exercise("1.2", "The inertia that the tip feels")
 def task_inertia(J, M):
     return np.linalg.inv(J @ np.linalg.inv(M) @ J.T)
@@ -88,6 +110,17 @@ task_inertia.mistake(
     "* multiplies number by number; matrices are multiplied with @.",
     "J @ np.linalg.inv(M) @ J.T",
     "J * np.linalg.inv(M) * J.T",
+)
+task_inertia.mistake(
+    "Joints feel each other: M has numbers beside its diagonal, and you leave them out.",
+    "np.linalg.inv(M)",
+    "np.diag(1 / np.diag(M))",
+)
+task_inertia.mistake(
+    "A redundant arm has joints that give way: pinv(J)^T M pinv(J) holds them still. Invert "
+    "J M^-1 J^T.",
+    "np.linalg.inv(J @ np.linalg.inv(M) @ J.T)",
+    "np.linalg.pinv(J).T @ M @ np.linalg.pinv(J)",
 )
 
 
@@ -133,6 +166,21 @@ osc.mistake(
     "A force at the tip becomes torques by J's transpose.", "J.T @ task_inertia", "J @ task_inertia"
 )
 osc.mistake("The damping is missing: - kd v.", " - kd * v", "")
+osc.mistake(
+    "kd is 2 sqrt(kp), whatever kp is; 40 belongs to kp = 400 alone.",
+    "2 * np.sqrt(kp)",
+    "40",
+)
+osc.mistake(
+    "h is a torque already: add it at the end. Yours is multiplied by M.",
+    "J.T @ task_inertia(J, M) @ (kp * e - kd * v) + h",
+    "J.T @ task_inertia(J, M) @ (kp * e - kd * v) + M @ h",
+)
+osc.mistake(
+    "M pinv(J) takes the shortest joint motion, which is not the one of least force: J^T Lambda.",
+    "J.T @ task_inertia(J, M) @ (kp * e - kd * v)",
+    "M @ (np.linalg.pinv(J) @ (kp * e - kd * v))",
+)
 
 
 @exercise("1.4", "Torques the tip does not feel", given=(task_inertia,))
@@ -169,6 +217,11 @@ nullspace.mistake(
     "That is N, which acts on velocities; torques need its transpose.",
     "J.T @ task_inertia(J, M) @ J @ np.linalg.inv(M)",
     "np.linalg.inv(M) @ J.T @ task_inertia(J, M) @ J",
+)
+nullspace.mistake(
+    "The identity is a matrix, np.eye(n): a plain 1 is subtracted from in every entry.",
+    "np.eye(len(M))",
+    "1",
 )
 
 
@@ -312,4 +365,9 @@ Point.mistake(
     "step.",
     "np.array([self.x], np.float32)",
     "np.array([self.x])",
+)
+Point.mistake(
+    "From the 50th step on the time is over, also for who goes on: >= and not ==.",
+    "self.t >= 50",
+    "self.t == 50",
 )

@@ -169,6 +169,17 @@ squash.mistake(
     ".sum(-1)",
     "",
 )
+squash.mistake(
+    "The Gaussian's exponent has (u - mean) / sigma, which is the noise; yours has u itself.",
+    "0.5 * noise**2",
+    "0.5 * u**2",
+)
+squash.mistake(
+    "Where u is cut off, the density is that of another action. The form with softplus bears "
+    "any u.",
+    "u = mean + log_std.exp() * noise",
+    "u = (mean + log_std.exp() * noise).clamp(-10, 10)",
+)
 
 
 @exercise("2.2", "The critics' target")
@@ -183,6 +194,8 @@ def _transitions(rng, ended=None):
     if ended:
         which = rng.permutation(math.prod(shape)).reshape(shape) < 3
         flags[ended] = torch.from_numpy(which.astype(np.float32))
+        if ended == "terminal":  # one of the three at the time limit, too
+            flags["truncated"] = flags[ended] * (flags[ended].cumsum(0) == 1)
     reward, q1, q2, log_pi = (_normal(rng, *shape, scale=k) for k in (1, 5, 5, 2))
     alpha, gamma = float(rng.uniform(0.1, 0.8)), float(rng.uniform(0.8, 0.99))
     return reward, flags["terminal"], flags["truncated"], q1, q2, log_pi, alpha, gamma
@@ -193,6 +206,11 @@ critic_target.check(
     "nothing comes after a terminal step", lambda rng: _transitions(rng, "terminal")
 )
 critic_target.check("the time limit is not an end", lambda rng: _transitions(rng, "truncated"))
+critic_target.mistake(
+    "Where both flags are 1 the task has ended, and nothing comes after: `terminal` alone decides.",
+    "(1 - terminal)",
+    "(1 - terminal * (1 - truncated))",
+)
 critic_target.mistake(
     "You believe the larger of the two critics; the smaller one guards against errors upwards.",
     "torch.minimum",
@@ -251,6 +269,16 @@ critic_target.mistake(
     "value = torch.minimum(q1, q2) - alpha * log_pi\n    return reward + gamma * (1 - terminal) * "
     "value",
     "return reward - alpha * log_pi + gamma * (1 - terminal) * torch.minimum(q1, q2)",
+)
+critic_target.mistake(
+    "The smaller value, not the one nearer to 0: values may be negative.",
+    "torch.minimum(q1, q2)",
+    "torch.where(q1.abs() < q2.abs(), q1, q2)",
+)
+critic_target.mistake(
+    "Each transition has a flag of its own: one that has ended does not end the batch.",
+    "(1 - terminal)",
+    "(1 - terminal.max())",
 )
 
 
@@ -332,6 +360,11 @@ follow.mistake(
     "with torch.no_grad()",
     "if True",
 )
+follow.mistake(
+    "You follow the weights alone: the biases are parameters, too.",
+    "            slow.copy_(",
+    "            if slow.dim() > 1: slow.copy_(",
+)
 
 
 @exercise(
@@ -341,6 +374,8 @@ follow.mistake(
     def probe(log_alpha, log_pi, target_entropy, ask):
         log_alpha, log_pi = log_alpha.clone().requires_grad_(), log_pi.clone().requires_grad_()
         loss = temperature_loss(log_alpha, log_pi, target_entropy)
+        if not log_pi.requires_grad:
+            raise ValueError("detach_() cuts the caller's own tensor off: detach() makes a new one")
         if ask == "loss":
             return loss.detach()
         if loss.requires_grad:
@@ -421,6 +456,16 @@ temperature_loss.mistake(
     "The loss is one number, the mean over the batch; yours still has one for each row.",
     ".mean()",
     "",
+)
+temperature_loss.mistake(
+    "A loss may be negative: without the absolute value it knows which way alpha has to go.",
+    "-(alpha * (log_pi.detach() + target_entropy)).mean()",
+    "(alpha * (log_pi.detach() + target_entropy).mean().abs())",
+)
+temperature_loss.mistake(
+    "The target belongs to each entry of the batch: take the mean of log_pi, not its sum.",
+    "(log_pi.detach() + target_entropy)).mean()",
+    "(log_pi.detach().sum() + target_entropy)).mean()",
 )
 
 
@@ -533,4 +578,14 @@ actor_loss.mistake(
     "The loss is one number, the mean over the batch; yours still has one for each state.",
     "- q).mean()",
     "- q)",
+)
+actor_loss.mistake(
+    "The smaller value is chosen number by number; you take the critic that is lower on average.",
+    "critics(s, a).amin(0)",
+    "critics(s, a).mean(1).min()",
+)
+actor_loss.mistake(
+    "The critics judge the action that was drawn; you show them the tanh of the mean.",
+    "critics(s, a)",
+    "critics(s, torch.tanh(mean))",
 )

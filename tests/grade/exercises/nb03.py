@@ -59,6 +59,21 @@ minimum_jerk.mistake("The hand begins at `start`: add the share of the way to it
 minimum_jerk.mistake(
     "The polynomial is 10 s^3 - 15 s^4 + 6 s^5: one sign is wrong.", "+ 6 * s**2", "- 6 * s**2"
 )
+minimum_jerk.mistake(
+    "That polynomial, 3 s^2 - 2 s^3, starts and ends with a jolt: take the one of degree 5.",
+    "s**3 * (10 - 15 * s + 6 * s**2)",
+    "s**2 * (3 - 2 * s)",
+)
+minimum_jerk.mistake(
+    "Clip the share, not the seconds: t / duration first.",
+    "np.clip(t / duration, 0, 1)",
+    "np.clip(t, 0, 1) / duration",
+)
+minimum_jerk.mistake(
+    "The share is that of `duration`, not of the last time that is asked for.",
+    "t / duration",
+    "t / t[-1]",
+)
 
 
 @exercise(
@@ -279,6 +294,11 @@ moving_share.mistake(
     "np.diff(x.reshape(-1, take), axis=1)",
     "x.reshape(-1, take)[:, 1:] - x.reshape(-1, take)[:, :1]",
 )
+moving_share.mistake(
+    "Your loop stops before the last take: the range has to reach the end.",
+    "x.reshape(-1, take)",
+    "x.reshape(-1, take)[:-1]",
+)
 
 
 @exercise("3.4", "From wish to action")
@@ -333,4 +353,14 @@ to_action.mistake(
     "Clip each coordinate by itself: yours shortens the whole vector.",
     "np.clip((wanted - goal) / step, -1, 1)",
     "(wanted - goal) / step / max(1, np.abs((wanted - goal) / step).max())",
+)
+to_action.mistake(
+    "Mind the brackets: (wanted - goal) / step.",
+    "(wanted - goal) / step",
+    "wanted - goal / step",
+)
+to_action.mistake(
+    "An action has a least value, too: clip to [-1, 1].",
+    "np.clip((wanted - goal) / step, -1, 1)",
+    "np.minimum((wanted - goal) / step, 1)",
 )

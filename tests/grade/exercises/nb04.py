@@ -91,6 +91,18 @@ adain.mistake(
     "h.var((2, 3), unbiased=False, keepdim=True).sqrt() + 1e-5",
 )
 adain.mistake("Add 1e-5 to the variance; yours is without.", " + 1e-5", "")
+adain.mistake(
+    "Each image has a look of its own: you give all of the batch that of the first.",
+    "std[:, :, None, None]",
+    "std[:1, :, None, None]",
+    "mean[:, :, None, None]",
+    "mean[:1, :, None, None]",
+)
+adain.mistake(
+    "The statistics go over height and width; yours go along the rows alone.",
+    "(2, 3)",
+    "3",
+)
 
 
 @exercise(
@@ -204,6 +216,12 @@ gan_losses.mistake(
     "((real - 1) ** 2).mean() + (made**2).mean()",
     "(((real - 1) ** 2).mean() + (made**2).mean()) / 2",
 )
+gan_losses.mistake(
+    "A mean for the real ones and a mean for the made ones, added: yours is one mean of all "
+    "together.",
+    "((real - 1) ** 2).mean() + (made**2).mean()",
+    "torch.cat([((real - 1) ** 2).flatten(), (made**2).flatten()]).mean()",
+)
 
 
 @exercise(
@@ -211,10 +229,11 @@ gan_losses.mistake(
     "Three reconstructions (Eq. 2-4)",
     probe="""
     def probe(x, y, w, ask):
-        # Encoders and generators of one weight each, (6,); those of the generators are trained.
+        # Encoders and generators of one weight each, (6,).
+        w = w.clone().requires_grad_()
         content = {"x": lambda v: w[0] * v + 0.1, "y": lambda v: w[1] * v - 0.2}
         style = {"x": lambda v: w[2] * v.mean((2, 3)), "y": lambda v: w[3] * v.mean((2, 3)) - 0.4}
-        g = w[4:].clone().requires_grad_()
+        g = w[4:]
         decode = {
             "x": lambda c, s: c + g[0] * s[:, :, None, None],
             "y": lambda c, s: g[1] * c - s[:, :, None, None],
@@ -226,9 +245,9 @@ gan_losses.mistake(
         for name, loss in zip(("image", "content", "style"), losses, strict=True):
             grad, more = None, {"retain_graph": True, "allow_unused": True}
             if torch.is_tensor(loss) and loss.requires_grad:
-                (grad,) = torch.autograd.grad(loss.sum(), g, **more)
-            grad = 0 * w[4:] if grad is None else grad
-            found[f"the gradient of the {name} loss for the generators"] = grad
+                (grad,) = torch.autograd.grad(loss.sum(), w, **more)
+            grad = torch.zeros_like(w) if grad is None else grad
+            found[f"the gradient of the {name} loss for encoders and generators"] = grad
         return found
     """,
 )
@@ -251,7 +270,30 @@ reconstructions.check("two batches of images", _both, points=2)
 reconstructions.check(
     "one image of each domain", lambda rng: ((b := _both(rng))[0][:1], b[1][:1], *b[2:])
 )
-reconstructions.check("the gradient reaches the generators", lambda rng: _both(rng, "gradient"))
+reconstructions.check(
+    "the gradient reaches encoders and generators", lambda rng: _both(rng, "gradient")
+)
+reconstructions.mistake(
+    "The values are right, but the codes that you compare with are the encoders' work, too: no "
+    "detach there.",
+    " - c_x)",
+    " - c_x.detach())",
+    " - s_x)",
+    " - s_x.detach())",
+)
+reconstructions.mistake(
+    "c_y is made by y's encoder, content[\"y\"]; you use x's.", 'content["y"](y)', 'content["x"](y)'
+)
+reconstructions.mistake(
+    "Eq. 4 paints an x: with x's generator, though the content is y's.",
+    'decode["x"](c_y, s_x)',
+    'decode["y"](c_y, s_x)',
+)
+reconstructions.mistake(
+    "Eq. 3 swaps the styles: x's content is painted in y with y's style, s_y.",
+    'decode["y"](c_x, s_y)',
+    'decode["y"](c_x, s_x)',
+)
 reconstructions.mistake(
     "The values are right, but no gradient leaves your function, and no network would learn: no "
     "detach, no item, no float, no torch.no_grad.",
@@ -342,12 +384,24 @@ def munit_loss(L, lam_image, lam_content, lam_style):
 
 def _losses(rng):
     names = [f"{kind}_{domain}" for kind in ("gan", "image", "content", "style") for domain in "xy"]
-    return {n: float(rng.uniform(0.1, 2)) for n in names}, *(
+    return {str(n): torch.tensor(rng.uniform(0.1, 2)) for n in rng.permutation(names)}, *(
         float(rng.uniform(0.2, 10)) for _ in range(3)
     )
 
 
 munit_loss.check("any losses, any weights", _losses)
+munit_loss.mistake(
+    "A dictionary is asked by its keys: yours relies on the order in which it was filled.",
+    'L["gan_x"] + L["gan_y"]\n'
+    '        + lam_image * (L["image_x"] + L["image_y"])\n'
+    '        + lam_content * (L["content_x"] + L["content_y"])\n'
+    '        + lam_style * (L["style_x"] + L["style_y"])',
+    "sum(w * v for w, v in zip((1, 1, lam_image, lam_image, lam_content, lam_content, "
+    "lam_style, lam_style), L.values()))",
+)
+munit_loss.mistake(
+    "y's losses are part of it: you take x's style loss twice.", 'L["style_y"]', 'L["style_x"]'
+)
 munit_loss.check(
     "with all weights 0 the game is left", lambda rng: (_losses(rng)[0], 0.0, 0.0, 0.0)
 )

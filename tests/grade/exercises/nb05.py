@@ -138,6 +138,11 @@ soft_argmax.mistake(
     "logits.flatten(2).softmax(-1)",
     "(logits.flatten(2).exp() / logits.flatten(2).exp().sum(-1, keepdim=True))",
 )
+soft_argmax.mistake(
+    "One softmax over all cells, then sums over rows or columns: yours adds logits up before.",
+    "(p.sum(2) * x).sum(-1), (p.sum(3) * y).sum(-1)",
+    "(logits.sum(2).softmax(-1) * x).sum(-1), (logits.sum(3).softmax(-1) * y).sum(-1)",
+)
 
 
 @exercise("5.2", "One map per image (the H of Eq. 6)", probe=gradients("heat_map", z=0))
@@ -154,6 +159,8 @@ def _points(rng, least=0.1, K=None, ask="values"):
     B, some, size = (int(n) for n in rng.integers((2, 2, 12), (6, 7, 25)))
     z = rng.uniform(-0.9, 0.9, (B, K or some, 2))
     sigma = float(rng.uniform(least, least + 0.15))
+    if ask == "gradient":  # one stands on the very centre of a cell
+        z[0, 0] = (2 * rng.integers(size, size=2) + 1) / size - 1
     return torch.from_numpy(np.float32(z)), sigma, size, ask
 
 
@@ -165,6 +172,12 @@ heat_map.check(
 )
 heat_map.check(
     "the gradient reaches the keypoints", lambda rng: _points(rng, 0.2, ask="gradient"), atol=1e-4
+)
+heat_map.mistake(
+    "The values are right, but where a keypoint stands on a cell's centre 1 - h is 0, and its "
+    "logarithm has no gradient: multiply.",
+    "1 - (1 - h).prod(1, keepdim=True)",
+    "1 - torch.exp(torch.log(1 - h).sum(1, keepdim=True))",
 )
 heat_map.mistake(
     "The values are right, but no gradient leaves your function, and the detector would not learn: "
@@ -329,6 +342,21 @@ transport.mistake(
     "(1 - h_x) * (1 - h_y)",
     "(1 - h_x * h_y)",
 )
+transport.mistake(
+    "Where both maps cover, 1 - H_x - H_y takes off twice: (1 - H_x)(1 - H_y).",
+    "(1 - h_x) * (1 - h_y)",
+    "(1 - h_x - h_y)",
+)
+transport.mistake(
+    "What is left is (1 - H_x)(1 - H_y), the product; you take off the larger of the two.",
+    "(1 - h_x) * (1 - h_y)",
+    "(1 - torch.maximum(h_x, h_y))",
+)
+transport.mistake(
+    "The values are right, but what is pasted keeps its gradient: y's features are what is learnt.",
+    "h_y * phi_y",
+    "h_y * phi_y.detach()",
+)
 
 
 @exercise("5.4", "The loss (Eq. 7), weighted", probe=gradients("loss", y_hat=0))
@@ -424,6 +452,11 @@ loss.mistake(
     "(y - median)",
     "(y_hat - median)",
 )
+loss.mistake(
+    "Keep the colours' axis, keepdim=True: (B, H, W) does not fit (B, 3, H, W).",
+    "keepdim=True",
+    "keepdim=False",
+)
 
 
 @exercise("5.5", "Does it follow the truth?")
@@ -515,4 +548,14 @@ r2.mistake(
     "Compare with the spread about the mean of the held-out truth, not about 0.",
     "(held - held.mean())",
     "held",
+)
+r2.mistake(
+    "Divide the errors and the spread by the same number; np.var with ddof=1 has one less.",
+    "((held - held.mean()) ** 2).sum()",
+    "(((held - held.mean()) ** 2).sum() * len(held) / (len(held) - 1))",
+)
+r2.mistake(
+    "You fit to x alone: each keypoint has two coordinates, and both belong to it.",
+    "z.reshape(len(z), -1)",
+    "z[..., 0].reshape(len(z), -1)",
 )

@@ -92,6 +92,27 @@ r1.mistake(
     "np.sqrt(((z_E[:-1] - z) ** 2).sum(axis=(1, 2)))",
     "np.sqrt(((z_E[:-1] - z) ** 2).sum(axis=2)).sum(axis=1)",
 )
+r1.mistake(
+    "ord=2 of a (K, 2) matrix is its largest singular value; the norm is the length of all "
+    "2K numbers.",
+    "np.sqrt(((z_E[:-1] - z) ** 2).sum(axis=(1, 2)))",
+    "np.linalg.norm(z_E[:-1] - z, 2, axis=(1, 2))",
+)
+r1.mistake(
+    "One frame is the nearest for the whole robot; in yours each keypoint has its own.",
+    "np.sqrt(((z_E[:-1] - z) ** 2).sum(axis=(1, 2)))",
+    "np.sqrt(((z_E[:-1] - z) ** 2).sum(2).min(0).sum(keepdims=True))",
+)
+r1.mistake(
+    "The norm is the root of a sum; yours is the root of a mean.",
+    ".sum(axis=(1, 2))",
+    ".mean(axis=(1, 2))",
+)
+r1.mistake(
+    "Python counts from 0: frames 1 to N - 1 of Eq. 9 are z_E[0] to z_E[N - 2], z_E[:-1].",
+    "z_E[:-1]",
+    "z_E[1:]",
+)
 
 
 @exercise("6.2", "The nearest step, r2 (Eq. 10)")
@@ -101,10 +122,14 @@ def r2(z, z_next, z_E):
     return -np.sqrt(((steps - step) ** 2).sum(axis=(1, 2))).min()
 
 
-r2.check(
-    "keypoints anywhere",
-    lambda rng: (*rng.normal(size=(2, *(z := _any_walk(rng))[0].shape)), z),
-)
+def _homewards(rng):
+    """A step about as long as from the last frame back to the first, which nobody made."""
+    z_E = _any_walk(rng)
+    z = rng.normal(size=z_E[0].shape)
+    return z, z + z_E[0] - z_E[-1] + rng.normal(size=z.shape) * 0.2, z_E
+
+
+r2.check("any step, no matter where", _homewards)
 r2.check(
     "a step of the demonstration, made elsewhere, earns 0",
     lambda rng: ((z := _any_walk(rng))[q := rng.integers(len(z) - 2)] + 3, z[q + 1] + 3, z),
@@ -170,6 +195,21 @@ r2.mistake(
     "step = z_next",
     "z_E[1:] - z_E[:-1]",
     "z_E[:-1]",
+)
+r2.mistake(
+    "You compare how long the steps are; Eq. 10 compares where they go, too.",
+    "np.sqrt(((steps - step) ** 2).sum(axis=(1, 2)))",
+    "np.abs(np.linalg.norm(steps, axis=(1, 2)) - np.linalg.norm(step))",
+)
+r2.mistake(
+    "A step leads from frame to frame, axis 0; np.diff takes the last axis and subtracts x from y.",
+    "z_E[1:] - z_E[:-1]",
+    "np.diff(z_E)",
+)
+r2.mistake(
+    "The last frame leads nowhere: np.roll adds a step from there to the first.",
+    "z_E[1:] - z_E[:-1]",
+    "np.roll(z_E, -1, axis=0) - z_E",
 )
 
 
@@ -255,6 +295,11 @@ episode_return.mistake(
     "return total",
     "return total / (len(z) - 1)",
 )
+episode_return.mistake(
+    "The robot's episode has T frames, z; you walk over those of the demonstration.",
+    "range(len(z) - 1)",
+    "range(min(len(z), len(z_E)) - 1)",
+)
 
 
 @exercise("6.4", "Cut the pauses")
@@ -293,7 +338,10 @@ trim.check(
     "slow motion is kept where it adds up",
     lambda rng: (_slow(rng), rng.uniform(0.15, 0.4)),
 )
-trim.check("where nothing rests, every frame stays, once", lambda rng: (_any_walk(rng), 1e-3))
+trim.check(
+    "where nothing rests, every frame stays, there and back",
+    lambda rng: (np.concatenate([z := _any_walk(rng), z[-2::-1]]), 1e-3),
+)
 trim.check("trembling on the spot is rest, however long the way", _trembling)
 trim.check(
     "a frame exactly `least` away stays",
@@ -302,6 +350,16 @@ trim.check(
 trim.check(
     "first and last frame stay",
     lambda rng: (_rest(rng), float(rng.uniform(0.05, 0.2))),
+)
+trim.mistake(
+    "Compare with the last frame that was kept: yours asks all of them, and a way back is lost.",
+    "np.linalg.norm(z[i] - z[kept[-1]]) >= least",
+    "all(np.linalg.norm(z[i] - z[k]) >= least for k in kept)",
+)
+trim.mistake(
+    "How far is one length of all 2K numbers; you add up one for each keypoint.",
+    "np.linalg.norm(z[i] - z[kept[-1]])",
+    "np.linalg.norm(z[i] - z[kept[-1]], axis=-1).sum()",
 )
 trim.mistake(
     "The distance counts, not the length of the way since the last frame you kept: what trembles "
@@ -446,4 +504,15 @@ timed_r1.mistake(
     "Here no minimum is taken: the frame is given by the time.",
     "-np.linalg.norm(z_next - target)",
     "-min(np.linalg.norm(z_next - frame) for frame in z_E)",
+)
+timed_r1.mistake(
+    "When the demonstration is over its last frame stays the target; yours pays nothing.",
+    "    return -np",
+    "    if t + 1 >= len(z_E):\n        return 0.0\n    return -np",
+)
+timed_r1.mistake(
+    "ord=2 of a (K, 2) matrix is its largest singular value; the norm is the length of all "
+    "2K numbers.",
+    "np.linalg.norm(z_next - target)",
+    "np.linalg.norm(z_next - target, 2)",
 )

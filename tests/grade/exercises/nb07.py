@@ -53,6 +53,16 @@ stopping.mistake(
     "v**2 / (2 * mu * g), v / (mu * g)",
     "v / (mu * g), v**2 / (2 * mu * g)",
 )
+stopping.mistake(
+    "Mind the brackets: v^2 / (2 mu g).",
+    "v**2 / (2 * mu * g)",
+    "v**2 / 2 * mu * g",
+)
+stopping.mistake(
+    "g is 9.81 m/s^2, not 10.",
+    "9.81",
+    "10",
+)
 
 
 @exercise("7.2", "The speeds that are good enough")
@@ -115,6 +125,17 @@ speeds.mistake(
     "Solve v^2 / (2 mu g) = distance for v: the square root is missing.", "np.sqrt", "float"
 )
 speeds.mistake("Solve v^2 / (2 mu g) = distance for v: the 2 is missing.", "2 * mu", "mu")
+speeds.mistake(
+    "The speed grows as the root of the way: add the slack before you take it.",
+    "np.sqrt(2 * mu * g * max(low, 0)), np.sqrt(2 * mu * g * high)",
+    "(max(np.sqrt(2 * mu * g * distance) - np.sqrt(2 * mu * g * slack), 0), "
+    "np.sqrt(2 * mu * g * distance) + np.sqrt(2 * mu * g * slack))",
+)
+speeds.mistake(
+    "Slack is a length in m, not a share of the distance.",
+    "distance - slack, distance + slack",
+    "distance * (1 - slack), distance * (1 + slack)",
+)
 
 
 @exercise("7.3", "Friction from a track")
@@ -173,6 +194,13 @@ friction.mistake(
     "-np.polyfit(t[:-1], np.diff(x) / dt, 1)[0]",
 )
 friction.mistake("What you return is a deceleration in m/s^2: divide by g.", "[0] / 9.81", "[0]")
+friction.mistake(
+    "t^2 is frames squared times dt squared: divide by dt twice.",
+    "dt * np.arange(len(x))",
+    "np.arange(len(x))",
+    "/ 9.81",
+    "/ dt / 9.81",
+)
 
 
 @exercise("7.4", "At the target, at rest")
@@ -278,4 +306,16 @@ solved.mistake(
     "np.gradient takes the mean of two steps; the speed is that of one, |x[t + 1] - x[t]| / dt.",
     "np.abs(np.diff(x)) / dt",
     "np.abs(np.gradient(x, dt))[1:]",
+)
+solved.mistake(
+    "T places have T - 1 steps: yours has one more, before the first.",
+    "np.diff(x)) / dt",
+    "np.diff(x, prepend=x[0])) / dt",
+    "x[1:]",
+    "x",
+)
+solved.mistake(
+    "`and` asks for one truth value; arrays are joined entry by entry, with &.",
+    "0.05) & (speed",
+    "0.05) and (speed",
 )

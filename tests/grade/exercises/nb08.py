@@ -108,6 +108,18 @@ foreground.mistake(
     "np.median(video, axis=0)",
     "np.median(video)",
 )
+foreground.mistake(
+    "Take the differences first, then the mean over the colours: more red and less green do "
+    "not cancel.",
+    "video = video.astype(float)",
+    "video = video.astype(float).mean(-1, keepdims=True)",
+)
+foreground.mistake(
+    "With an even number of frames torch.median takes the lower of the two in the middle; "
+    "np.median their mean.",
+    "np.median(video, axis=0)",
+    "torch.from_numpy(video).median(0).values.numpy()",
+)
 
 
 @exercise("8.3", "Where the motion is")
@@ -181,6 +193,21 @@ share_inside.mistake(
     "/ energy.sum()",
     "/ max(energy[~mask].sum(), 1e-9)",
 )
+share_inside.mistake(
+    "Inside over the whole, which is a share; yours is inside over outside.",
+    "/ energy.sum()",
+    "/ energy[~mask].sum()",
+)
+share_inside.mistake(
+    "np.diff takes the last axis, from colour to colour: energy is between frames, axis=0.",
+    "np.diff(video.astype(float), axis=0)",
+    "np.diff(video.astype(float))",
+)
+share_inside.mistake(
+    "int16 ends at 32,767, and a square of 182 and more does not fit: use floats.",
+    "video.astype(float)",
+    "video.astype(np.int16)",
+)
 
 
 @exercise("8.1", "Slide or tip")
@@ -219,6 +246,16 @@ highest_push.mistake(
     "The weight acts in the middle, a whole radius from the edge, not half of one.",
     "radius / mu",
     "radius / (2 * mu)",
+)
+highest_push.mistake(
+    "The height is in m, as the radius is; yours is in cm.",
+    "radius / mu",
+    "100 * radius / mu",
+)
+highest_push.mistake(
+    "// cuts off what is behind the point: divide with /.",
+    "radius / mu",
+    "radius // mu",
 )
 
 

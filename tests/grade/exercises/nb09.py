@@ -134,6 +134,12 @@ make_drawer.mistake(
     "physicsClientId=client",
     "physicsClientId=client - 1",
 )
+make_drawer.mistake(
+    "halfExtents are half the edges, and the text gives these halves already: yours is half "
+    "as large.",
+    "(0.05, 0.08, 0.04)",
+    "(0.025, 0.04, 0.02)",
+)
 
 
 @exercise("9.2", "What the policy sees")

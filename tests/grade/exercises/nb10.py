@@ -112,6 +112,26 @@ wilson.mistake(
     "max(0.0, centre - half), min(1.0, centre + half)",
     "centre, half",
 )
+wilson.mistake(
+    "The centre has z^2 / (2 n), half of what you add.",
+    "z**2 / (2 * n)",
+    "z**2 / n",
+)
+wilson.mistake(
+    "1 + z^2 / n divides the half width, too.",
+    " + z**2 / (4 * n**2)) / (1 + z**2 / n)",
+    " + z**2 / (4 * n**2))",
+)
+wilson.mistake(
+    "95 % lie within 1.96 on both sides; 1.645 leaves out 5 % on each.",
+    "1.96",
+    "1.645",
+)
+wilson.mistake(
+    "// cuts off what is behind the point: the share of wins is wins / n.",
+    "wins / n",
+    "wins // n",
+)
 
 
 @exercise("10.2", "How often by luck?")
@@ -258,6 +278,12 @@ difference.mistake(
     "a[picks_a].mean(1) - b[picks_b].mean(1)",
     "b[picks_b].mean(1) - a[picks_a].mean(1)",
 )
+difference.mistake(
+    "The picks say which episodes are drawn: you draw your own.",
+    "a[picks_a].mean(1) - b[picks_b].mean(1)",
+    "(a[np.random.default_rng(0).integers(len(a), size=picks_a.shape)].mean(1) - "
+    "b[np.random.default_rng(1).integers(len(b), size=picks_b.shape)].mean(1))",
+)
 
 
 @exercise("10.4", "Is this task fair?")
@@ -360,4 +386,16 @@ verdict.mistake(
     "Ask for idling first: where it solves the task, chance does as well.",
     "if idle.any():",
     "if random.mean() > 0.05:\n        return 'solved by chance'\n    if idle.any():",
+)
+verdict.mistake(
+    "The first reason that holds is the verdict; in yours a later one takes its place.",
+    '    if idle.any():\n        return "solved by doing nothing"\n    if random.mean() > 0.05:\n        return "solved by chance"\n    if not expert.all():\n        return "not even the expert solves it"\n',
+    '    if not expert.all():\n        return "not even the expert solves it"\n    if random.mean() > 0.05:\n        return "solved by chance"\n    if idle.any():\n        return "solved by doing nothing"\n',
+)
+verdict.mistake(
+    "numpy's truth values are not Python's own: `is True` never holds. Ask `if idle.any():`.",
+    "if idle.any():",
+    "if idle.any() is True:",
+    "if not expert.all():",
+    "if expert.all() is False:",
 )

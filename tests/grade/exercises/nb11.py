@@ -132,6 +132,11 @@ cyclegan_loss.mistake(
     "D_x(x_of_y)",
     "D_x(x_of_y.detach())",
 )
+cyclegan_loss.mistake(
+    "The loss here has two parts, the game and the cycle: you add an identity loss.",
+    "game + lam * cycle",
+    "game + lam * cycle + lam / 2 * ((to_y(y) - y).abs().mean() + (to_x(x) - x).abs().mean())",
+)
 
 
 @exercise(
@@ -175,8 +180,8 @@ def _room(rng):
     return _pool(rng, size, int(rng.integers(0, size - new + 1)), new)
 
 
-def _full(rng, **more):
-    size = int(rng.integers(1, 6))
+def _full(rng, least=1, **more):
+    size = int(rng.integers(least, 6))
     return _pool(rng, size, size, int(rng.integers(4, 9)), **more)
 
 
@@ -190,7 +195,7 @@ swap.check("a full pool gives one back for every second", _full, points=2)
 swap.check("a pool that becomes full on the way", _filling)
 swap.check(
     "an image can come back within its own batch",
-    lambda rng: _full(rng, coins=(0.1, 0.4), places=int(rng.integers(1, 3))),
+    lambda rng: _full(rng, least=2, coins=(0.1, 0.4), places=int(rng.integers(1, 3))),
 )
 swap.check("nothing it returns is tied to the generator", lambda rng: _full(rng, ask="gradient"))
 swap.mistake(
@@ -257,6 +262,23 @@ swap.mistake(
     "does not take them in.",
     "        else:\n            shown.append(image)",
     "        else:\n            shown.append(image)\n            pool[place] = image",
+)
+swap.mistake(
+    "The new image takes the old one's place; yours goes to the end of the pool.",
+    "            pool[place] = image\n",
+    "            del pool[place]\n            pool.append(image)\n",
+)
+swap.mistake(
+    "The pool holds `size` images at most; yours grows to one more.",
+    "len(pool) < size",
+    "len(pool) <= size",
+)
+swap.mistake(
+    "coins[i] and places[i] belong to image i, also where there was room and they are not asked.",
+    "for image, coin, place in zip(made.detach(), coins, places, strict=True):",
+    "coins, places = iter(coins), iter(places)\n    for image in made.detach():",
+    "elif coin < 0.5:",
+    "elif next(coins) < 0.5:\n            place = next(places)",
 )
 
 
@@ -380,6 +402,25 @@ mixup_loss.mistake(
     "share * labels + (1 - share) * labels[partner]",
     "labels",
 )
+mixup_loss.mistake(
+    "Mix with the partners as they came: images you have mixed in place are others already.",
+    "mixed = own * images + (1 - own) * images[partner]",
+    "mixed = images.clone()\n    for i in range(len(mixed)):\n        mixed[i] = "
+    "own[i] * mixed[i] + (1 - own[i]) * mixed[partner[i]]",
+)
+mixup_loss.mistake(
+    "The goals come first, then the others: share and partner count in this order.",
+    "torch.cat([goals, others])",
+    "torch.cat([others, goals])",
+    "torch.cat([torch.ones(len(goals)), torch.zeros(len(others))])",
+    "torch.cat([torch.zeros(len(others)), torch.ones(len(goals))])",
+)
+mixup_loss.mistake(
+    "`share` is that of the own image, as it is that of the own label: yours has the images "
+    "the other way round.",
+    "own * images + (1 - own) * images[partner]",
+    "(1 - own) * images + own * images[partner]",
+)
 
 
 @exercise(
@@ -495,4 +536,15 @@ sac_ae_losses.mistake(
     "Return the critic's loss, the autoencoder's, and the actor's, in this order.",
     "return critic_loss, autoencoder_loss, actor_loss",
     "return autoencoder_loss, critic_loss, actor_loss",
+)
+sac_ae_losses.mistake(
+    "The values are right, but the actor still pulls at the encoder: it has to see the "
+    "detached latents, too.",
+    "actor(seen))",
+    "actor(h))",
+)
+sac_ae_losses.mistake(
+    "y is (B,) as the critic's values are: with (B, 1) every value meets every target.",
+    "(critic(h, a) - y)",
+    "(critic(h, a) - y[:, None])",
 )

@@ -97,6 +97,12 @@ resample.mistake(
     "axis=1",
     "axis=0",
 )
+resample.mistake(
+    "The steps are 1 / fps, whatever is left at the end; linspace to the last moment "
+    "stretches them.",
+    "times[0] + np.arange(n) / fps",
+    "np.linspace(times[0], times[-1], n)",
+)
 
 
 @exercise("12.2", "The longest piece without a cut")
@@ -108,11 +114,12 @@ def longest_piece(times, tip, most):
     return max(pieces, key=lambda piece: times[piece[1] - 1] - times[piece[0]])
 
 
-def _cut_film(rng, frames, slow=None, waits=True):
+def _cut_film(rng, frames, slow=None, waits=True, gap=None):
     """Times, the tip's path and the highest speed of a hand, px/s; a cut between the pieces.
 
     frames: how many each piece has. slow: the piece whose frames come rarely, and which so lasts
-    longest. waits: in a longer piece, after one frame, nothing comes for over a second.
+    longest. waits: in a longer piece, after one frame, nothing comes for over a second. gap: the
+    piece after which nothing comes for longer than any piece lasts.
     """
     most = float(rng.uniform(60, 300))
     steps, shares = [], []
@@ -123,6 +130,7 @@ def _cut_film(rng, frames, slow=None, waits=True):
             step[1] = rng.uniform(1.2, 1.6)
             share[1] = 0.95
         share[-1] = rng.uniform(1.05, 1.3)  # the cut after it
+        step[-1] = 5 if k == gap else step[-1]
         steps, shares = [*steps, *step], [*shares, *share]
     steps, shares = np.array(steps[:-1]), np.array(shares[:-1])
     angle = rng.choice([0.25, 0.75, 1.25, 1.75], len(steps)) * np.pi + rng.uniform(-0.2, 0.2)
@@ -135,12 +143,17 @@ def _several(rng, at):
     """Three or four pieces, the one at index `at` with most frames and so the longest."""
     frames = [int(n) for n in rng.integers(4, 6, int(rng.integers(3, 5)))]
     frames[at] += 30
-    return _cut_film(rng, frames)
+    return _cut_film(rng, frames, gap=0 if at else 1)
 
 
 longest_piece.check("cuts, and the longest piece between two of them", lambda r: _several(r, 1))
 longest_piece.check("the longest piece comes first", lambda r: _several(r, 0))
 longest_piece.check("the longest piece comes last", lambda r: _several(r, -1))
+longest_piece.mistake(
+    "A piece ends with its own last frame; yours lasts until the next one begins, over the cut.",
+    "times[piece[1] - 1] - times[piece[0]]",
+    "times[min(piece[1], len(times) - 1)] - times[piece[0]]",
+)
 longest_piece.check("a clip without a cut", lambda rng: _cut_film(rng, [int(rng.integers(5, 12))]))
 longest_piece.check(
     "few frames that last long against many that do not",
@@ -290,6 +303,16 @@ fit.mistake(
     "s = abs(a)",
     "s = abs(rise / dy) if dy else abs(a)",
 )
+fit.mistake(
+    "z along the way has a part from dy, too: b makes up for -s dy.",
+    "(rise + s * dy) / dx",
+    "rise / dx",
+)
+fit.mistake(
+    "The scale is fixed by x alone, way / dx; yours compares whole lengths, and misses the end.",
+    "a = way / dx",
+    "a = np.hypot(way, rise) / np.hypot(dx, dy)",
+)
 
 
 @exercise("12.4", "How far it has come")
@@ -317,10 +340,16 @@ def _noisy(rng):
     """Shares that now and then fall, and that never leave 0 to 1."""
     shares = _rising(rng)
     shares[2] = shares[1] - 0.6 * shares[0]
+    shares[3] = shares[1] - 0.3 * shares[0]  # still behind, though ahead of the one before
     shares[-1] = shares[-2] - 0.05
     return shares
 
 
+progress.mistake(
+    "You compare with the frame before alone: keep the largest share of all frames so far.",
+    "np.maximum.accumulate(np.clip(share, 0, 1))",
+    "np.maximum(np.clip(share, 0, 1), np.append(0, np.clip(share[:-1], 0, 1)))",
+)
 progress.check("on the straight line", lambda rng: _way(rng, _rising(rng)))
 progress.check("beside it", lambda rng: _way(rng, _rising(rng), aside=0.3))
 progress.check("noise that throws it back", lambda rng: _way(rng, _noisy(rng)))
