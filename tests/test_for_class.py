@@ -96,3 +96,13 @@ def test_the_corridor_turns_round_where_the_clock_is_an_end():
     assert (round(stay), round(walk)) == (25, 34)
     stay, walk = plans(0.98 * 0.9)
     assert (round(stay, 1), round(walk, 2)) == (4.2, 0.78)
+
+
+def test_the_exams_object_earns_what_the_reference_pays():
+    d_E = np.array([[0.0, 0], [3, 0], [6, 0]])
+    first = np.zeros(2), np.array([2.0, 0]), np.array([-2.0, 0]), d_E, 0
+    parts = [run("13.4", *first, lam) for lam in np.eye(3)]
+    assert parts == [pytest.approx(-1 / 6)] * 3
+    knocked = np.zeros(2), np.array([-30.0, 0]), np.zeros(2), d_E, 1
+    assert run("13.4", *knocked, np.eye(3)[0]) == -2
+    assert np.linalg.norm(knocked[1] - d_E[2]) / 6 == 6

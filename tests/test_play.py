@@ -59,12 +59,13 @@ print(len(curves.lines["one"]))
 
 
 def test_in_the_book_a_slider_is_its_strip_and_a_curve_its_end(tmp_path):
-    cells = [nbformat.v4.new_code_cell(code) for code in (SLIDER, CURVE)]
+    here = f"import sys\nsys.path.insert(0, {str(course.ROOT)!r})"
+    cells = [nbformat.v4.new_code_cell(code) for code in (here, SLIDER, CURVE)]
     title = nbformat.v4.new_markdown_cell("# 1. x\n\n**The question.** Why?\n\nText.")
     path = tmp_path / "01_x.ipynb"
     nbformat.write(nbformat.v4.new_notebook(cells=[title, *cells]), path)
     done = course.execute(path)
-    (shown,), (curve, _) = done.cells[1].outputs, done.cells[2].outputs
+    (shown,), (curve, _) = done.cells[2].outputs, done.cells[3].outputs
     assert WIDGET in shown.data and "image/png" in shown.data
     assert curve.output_type == "display_data" and "image/png" in curve.data
     html = course.page(done, path)

@@ -220,8 +220,8 @@ def test_what_was_found_is_laid_by_the_clips_shorter_side_cuts_and_marks(monkeyp
     n = 6
     clip = Clip(np.zeros((n, 90, 160, 3), np.uint8), 2 + np.arange(n) / 20, [4], [])
     nothing = Found(np.zeros((n, 2)), np.zeros((n, 2)), np.zeros(n), np.zeros(n))
-    monkeypatch.setattr(prepare, "look", lambda frames: nothing)
-    monkeypatch.setattr(prepare.footage, "check", lambda frames, cuts: [f"cut at {cuts}"])
+    monkeypatch.setattr(prepare, "look", lambda frames, cuts: nothing)
+    monkeypatch.setattr(prepare.footage, "check", lambda frames, cuts: (frames, [f"cut at {cuts}"]))
     monkeypatch.setattr(
         prepare,
         "lay",
