@@ -340,14 +340,6 @@ verdict.check(
     "one with an expert that fails", lambda rng: (*(t := _task(rng))[:2], _one(rng, t[2], False))
 )
 verdict.check("two or three of them at once: name the first", _several, trials=6)
-_IDLE, _CHANCE, _EXPERT = (
-    f'    if {condition}:\n        return "{reason}"\n'
-    for condition, reason in (
-        ("idle.any()", "solved by doing nothing"),
-        ("random.mean() > 0.05", "solved by chance"),
-        ("not expert.all()", "not even the expert solves it"),
-    )
-)
 verdict.mistake(
     "More than 5 %: a share of just 0.05 may stand, > and not >=.",
     "random.mean() > 0.05",
@@ -397,8 +389,18 @@ verdict.mistake(
 )
 verdict.mistake(
     "The first reason that holds is the verdict; in yours a later one takes its place.",
-    _IDLE + _CHANCE + _EXPERT,
-    _EXPERT + _CHANCE + _IDLE,
+    "    if idle.any():\n"
+    '        return "solved by doing nothing"\n'
+    "    if random.mean() > 0.05:\n"
+    '        return "solved by chance"\n'
+    "    if not expert.all():\n"
+    '        return "not even the expert solves it"\n',
+    "    if not expert.all():\n"
+    '        return "not even the expert solves it"\n'
+    "    if random.mean() > 0.05:\n"
+    '        return "solved by chance"\n'
+    "    if idle.any():\n"
+    '        return "solved by doing nothing"\n',
 )
 verdict.mistake(
     "numpy's truth values are not Python's own: `is True` never holds. Ask `if idle.any():`.",
