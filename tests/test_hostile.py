@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-needs_sandbox = pytest.mark.skipif(sys.platform != "linux", reason="the sandbox is Linux's")
+needs_sandbox = pytest.mark.skipif(sys.platform != "linux", reason="needs Linux's sandbox")
 
 
 def graded(tmp_path, whole, odd, path=""):
