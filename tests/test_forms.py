@@ -202,8 +202,7 @@ FORMS = {
         "    return d(decode['x'](c['x'], s['x']), x), d(content['y'](y_hat), c['x']), "
         "d(style['x'](x_hat), s['x'])",
         "def reconstructions(x, y, content, style, decode):\n"
-        "    with torch.no_grad():\n"
-        "        cx, sx, cy, sy = content['x'](x), style['x'](x), content['y'](y), style['y'](y)\n"
+        "    (cx, sx), (cy, sy) = ((content[d](v), style[d](v)) for d, v in zip('xy', (x, y)))\n"
         "    out = (decode['x'](cx, sx) - x, content['y'](decode['y'](cx, sy)) - cx,\n"
         "           style['x'](decode['x'](cy, sx)) - sx)\n"
         "    return tuple(o.abs().mean() for o in out)",
