@@ -99,3 +99,18 @@ def test_flow_explains_what_only_moved():
 
 def test_fewer_than_three_frames_have_no_jump():
     assert jumps(film([10.0, 60.0]), np.array([0, 3.0])) == []
+
+
+@pytest.mark.parametrize(
+    ("rate", "times", "jumped"),
+    [(25, 3.2, False), (25, 3.4, True), (10, 4.3, False), (10, 4.5, True)],
+)
+def test_a_jump_is_three_times_what_is_usual_nearby_and_more_where_frames_are_far_apart(
+    rate, times, jumped, monkeypatch
+):
+    """One grey level before and after, and 0.1 more: 3.3 of them; at 10 a second four thirds."""
+    rest = np.zeros(40)
+    rest[[17, 18, 22, 23]], rest[20] = 1.0, times
+    monkeypatch.setattr(motion, "_unexplained", lambda frames, size: (rest, rest))
+    frames = np.zeros((41, 84, 84, 3), np.uint8)
+    assert jumps(frames, np.arange(41) / rate) == ([21] if jumped else [])

@@ -108,7 +108,8 @@ def test_the_clip_of_the_recipe_bounds_the_reward():
     assert reward == 1.0 and info["reward_parts"]["logit"] > 5
 
 
-def test_each_stage_of_a_rival_takes_the_recipes_numbers(tmp_path, monkeypatch):
+@pytest.mark.parametrize("motion", [False, True])
+def test_each_stage_of_a_rival_takes_the_recipes_numbers(motion, tmp_path, monkeypatch):
     given = {}
 
     def trains(name, result):
@@ -121,7 +122,7 @@ def test_each_stage_of_a_rival_takes_the_recipes_numbers(tmp_path, monkeypatch):
     monkeypatch.setattr(sac_ae, "save", lambda path, agent: path.write_text(agent))
     monkeypatch.setattr(sac_ae, "load", lambda path: path.read_text())
     recipe = Recipe(
-        human_frames=0, robot_frames=0, munit_iterations=11, munit_width=12, motion=True,
+        human_frames=0, robot_frames=0, munit_iterations=11, munit_width=12, motion=motion,
         classifier_iterations=13, policy_steps=14, pixel_updates=15, hold=16, entropy=-1.75,
         clip=3.0, random_negatives=False,
     )  # fmt: skip
@@ -131,7 +132,7 @@ def test_each_stage_of_a_rival_takes_the_recipes_numbers(tmp_path, monkeypatch):
     assert policy == "agent" and env.get_wrapper_attr("classifier_reward").clip == 3.0
     options = {name: given[name][1] for name in given}
     for name, asked in {
-        "G": {"iterations": 11, "width": 12, "motion": True, "seed": 0},
+        "G": {"iterations": 11, "width": 12, "motion": motion, "seed": 0},
         "D": {"iterations": 13, "seed": 0},
         "policy": {"steps": 14, "updates": 15, "hold": 16, "entropy": -1.75, "seed": 0},
     }.items():

@@ -135,6 +135,51 @@ def test_starts_are_drawn_from_as_far_as_the_jitter_says(id):
     assert off[:, 1] == pytest.approx(np.zeros(60), abs=1e-5)
 
 
+@pytest.mark.parametrize(
+    ("name", "body", "target", "within"),
+    [("push", "cube", 0.68, 0.05), ("slide", "puck", 0.94, 0.05), ("coffee", "mug", 0.69, 0.07)],
+)
+def test_success_is_within_as_many_centimetres_as_the_paper_or_its_source_says(
+    name, body, target, within
+):
+    """On either side of the target, a millimetre nearer or farther than that."""
+    env = make(f"LbW-{name.capitalize()}-v0", observation="state").unwrapped
+    env.reset(seed=0)
+    height = env.target_position()[2]
+    for side in (-1, 1):
+        for off, done in ((within - 0.001, True), (within + 0.001, False)):
+            place = target + side * off, 0, height
+            env.world.p.resetBasePositionAndOrientation(getattr(env, body), place, (0, 0, 0, 1))
+            assert env.is_success() == done, place
+    env.close()
+
+
+def test_a_ball_is_reached_within_5_cm_and_a_drawer_is_shut_from_3_cm_on():
+    reach, drawer = (
+        make(f"LbW-{n}-v0", observation="state").unwrapped for n in ("Reach", "Drawer")
+    )
+    for env in (reach, drawer):
+        env.reset(seed=0)
+    for off, done in ((0.049, True), (0.051, False)):
+        reach.arm.reset(np.array([0.68 - off, 0, 0.06]))
+        assert reach.is_success() == done
+    for q, done in ((-0.031, True), (-0.032, False), (0.0, True)):
+        drawer.world.p.resetJointState(drawer.drawer, 0, q)
+        assert drawer.is_success() == done
+    reach.close(), drawer.close()
+
+
+def test_a_puck_that_slides_through_its_target_is_not_there_yet():
+    """It rests below 2 cm/s."""
+    env = make("LbW-Slide-v0", observation="state").unwrapped
+    env.reset(seed=0)
+    env.world.p.resetBasePositionAndOrientation(env.puck, (0.94, 0, 0.02), (0, 0, 0, 1))
+    for speed, done in ((0.019, True), (0.021, False), (-0.5, False)):
+        env.world.p.resetBaseVelocity(env.puck, (speed, 0, 0))
+        assert env.is_success() == done
+    env.close()
+
+
 @pytest.mark.parametrize("id", IDS)
 def test_an_episode_goes_on_after_its_success(id):
     env = make(id, observation="state").unwrapped
