@@ -311,7 +311,7 @@ def test_grades_of_a_cluster_are_those_of_one_machine(nodes, tmp_path, monkeypat
         {p.relative_to(out): p.read_bytes() for p in sorted(out.rglob("*")) if p.is_file()}
         for out in (tmp_path / "alone", tmp_path / "there")
     )
-    assert len(alone) == 3 + 6 * 3 and alone == there
+    assert len(alone) == 3 + 5 + 6 * 3 and alone == there  # of the class, its reports, and each
     monkeypatch.setattr(cluster, "spread", lambda *_: pytest.fail("it is graded again"))
     assert grade([*every, str(tmp_path / "there"), "--ray"]) == 0
     hand_in(folder, gus=SOLVED)
