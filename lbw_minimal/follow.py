@@ -28,8 +28,8 @@ from gymnasium.utils import RecordConstructorArgs
 from gymnasium.wrappers import TimeLimit
 from numpy.typing import ArrayLike
 
-from lbw_minimal import sac, tracks
-from lbw_minimal.imitate import Recipe, Run
+from lbw_minimal import tracks
+from lbw_minimal.imitate import Recipe, Run, learn_policy
 from lbw_minimal.reward import MOST_OF_HORIZON, Parts, resample
 from lbw_minimal.sac_networks import Policy
 from lbw_minimal.training import InputError
@@ -166,13 +166,4 @@ def follow(
     wrapped so that its observations are the policy's.
     """
     env, _ = watched(env, demo, robot)
-    path = run.out / "policy.safetensors"
-    if not path.exists():
-        with run.stage("policy") as checkpoint:
-            agent, log = sac.train(
-                env, steps=recipe.policy_steps, updates=recipe.updates,
-                entropy=recipe.entropy, seed=seed, checkpoint=checkpoint,
-            )  # fmt: skip
-            run.log("policy_log", log)
-            sac.save(path, agent)
-    return sac.load(path), env
+    return learn_policy(env, recipe, seed, run), env

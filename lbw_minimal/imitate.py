@@ -221,6 +221,11 @@ def imitate(
     """
     perception.watch(demo)
     env, _ = watched(env, perception, robot, form, without)
+    return learn_policy(env, recipe, seed, run), env
+
+
+def learn_policy(env: gym.Env, recipe: Recipe, seed: int, run: Run) -> sac.Policy:
+    """SAC's policy for `env`, an environment of vectors: trained, or as the run has it."""
     path = run.out / "policy.safetensors"
     if not path.exists():
         with run.stage("policy") as checkpoint:
@@ -230,4 +235,4 @@ def imitate(
             )  # fmt: skip
             run.log("policy_log", log)
             sac.save(path, agent)
-    return sac.load(path), env
+    return sac.load(path)

@@ -8,6 +8,7 @@ import subprocess
 import urllib.request
 from contextlib import asynccontextmanager
 
+import pytest
 from tornado.websocket import websocket_connect
 
 CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
@@ -66,3 +67,13 @@ async def opened(path, profile, *options):
     finally:
         process.kill()
         process.wait()
+
+
+def seen(tmp_path_factory, write, look):
+    """What look(folder) finds in pages that write(folder) has written, all in one browser, whose
+    start takes longest. Skips the test where there is none."""
+    if not CHROMIUM:
+        pytest.skip("needs Chromium")
+    folder = tmp_path_factory.mktemp("pages")
+    write(folder)
+    return asyncio.run(look(folder))

@@ -2,15 +2,18 @@
 
 import json
 import warnings
+from functools import partial
 
 import gymnasium as gym
 import numpy as np
 import pytest
+import toy_film
 from gymnasium.utils.env_checker import check_env
+from toy_film import Film
 from toy_square import HERE, scene, texture, ways
 
 import tasks
-from lbw_minimal import follow, tracks, video
+from lbw_minimal import follow, sac, tracks, video
 from lbw_minimal.follow import TrackReward, TrackWrapper
 from lbw_minimal.imitate import Run
 from lbw_minimal.training import InputError
@@ -72,32 +75,6 @@ def test_a_path_that_shows_nothing_is_refused(path):
         TrackReward(path)
 
 
-class Film(gym.Env):
-    """Plays given frames, whatever one does. The world behind them is closed: reading it raises."""
-
-    observation_space = gym.spaces.Box(0, 255, (84, 84, 3), np.uint8)
-    action_space = gym.spaces.Box(-1, 1, (3,), np.float32)
-
-    class Info(dict):
-        def _closed(self, *_):
-            raise AssertionError("the simulator's state was read")
-
-        __getitem__ = get = items = values = _closed
-
-    def __init__(self, frames, reward=0.0, ends=10**6):
-        self.frames, self.own_reward, self.ends, self.t = frames, reward, ends, 0
-
-    def reset(self, *, seed=None, options=None):
-        super().reset(seed=seed)
-        self.t = 0
-        return self.frames[0], self.Info(object=[1.0, 2.0])
-
-    def step(self, action):
-        self.t += 1
-        frame = self.frames[min(self.t, len(self.frames) - 1)]
-        return frame, self.own_reward, self.t >= self.ends, False, self.Info(is_success=True)
-
-
 WALL = texture().astype(np.uint8)
 
 
@@ -107,14 +84,7 @@ def wrapped(frames, **options):
     return TrackWrapper(Film(frames, **options), tracker, TrackReward(shown.path))
 
 
-def play(env, steps=18):
-    """Observations (steps + 1, 15) and rewards (steps,) of an episode."""
-    seen, paid = [env.reset(seed=0)[0]], []
-    for _ in range(steps):
-        obs, r, *_ = env.step(np.zeros(3, np.float32))
-        seen.append(obs)
-        paid.append(r)
-    return np.array(seen), np.array(paid)
+play = partial(toy_film.play, steps=18)
 
 
 def test_gymnasium_has_nothing_to_complain_about(monkeypatch):
@@ -222,7 +192,7 @@ def test_the_method_goes_from_a_video_to_a_policy_and_repeats_nothing(tmp_path, 
     policy, env = learn()
     obs, _ = env.reset(seed=0)
     assert obs.shape == (15,) and policy.act(obs, deterministic=True).shape == (3,)
-    monkeypatch.setattr(follow.sac, "train", lambda *_, **__: pytest.fail("trained again"))
+    monkeypatch.setattr(sac, "train", lambda *_, **__: pytest.fail("trained again"))
     again, _ = learn()
     np.testing.assert_array_equal(
         again.act(obs, deterministic=True), policy.act(obs, deterministic=True)

@@ -1,7 +1,5 @@
 """The grader's pages by day, by night, on a phone and on paper."""
 
-import asyncio
-
 import pytest
 
 from tests import browser
@@ -50,11 +48,7 @@ async def look(folder):
 
 @pytest.fixture(scope="module")
 def seen(tmp_path_factory):
-    if not browser.CHROMIUM:
-        pytest.skip("needs Chromium")
-    folder = tmp_path_factory.mktemp("pages")
-    write_pages(folder)
-    return asyncio.run(look(folder))
+    return browser.seen(tmp_path_factory, write_pages, look)
 
 
 @pytest.mark.parametrize("how", ["day", "night", "phone"])

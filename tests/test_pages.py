@@ -1,6 +1,5 @@
 """The kit's pages on a wide screen, on a phone and on paper: legible, described, and whole."""
 
-import asyncio
 import re
 
 import nbformat
@@ -169,12 +168,7 @@ async def look(folder):
 
 @pytest.fixture(scope="module")
 def seen(tmp_path_factory):
-    """All pages in one browser, whose start takes longest."""
-    if not browser.CHROMIUM:
-        pytest.skip("needs Chromium")
-    folder = tmp_path_factory.mktemp("pages")
-    write_pages(folder)
-    return asyncio.run(look(folder))
+    return browser.seen(tmp_path_factory, write_pages, look)
 
 
 @pytest.mark.parametrize("name", NAMES)

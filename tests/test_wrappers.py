@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import torch
 from gymnasium.utils.env_checker import check_env
+from toy_film import Film, play
 from toy_push import ToyPush, demonstration, detect, random_frames
 
 from lbw_minimal.classifier import ClassifierReward, GoalClassifier
@@ -36,45 +37,6 @@ def timed():
 
 def wrap(env, reward):
     return KeypointRewardWrapper(KeypointObservation(env, detect), reward)
-
-
-class Film(gym.Env):
-    """Plays given frames, whatever one does. The world behind them is closed: reading it raises."""
-
-    observation_space = gym.spaces.Box(0, 255, (84, 84, 3), np.uint8)
-    action_space = gym.spaces.Box(-1, 1, (3,), np.float32)
-
-    class Info(dict):
-        def _closed(self, *_):
-            raise AssertionError("the simulator's state was read")
-
-        __getitem__ = get = items = values = _closed
-
-    def __init__(self, frames, reward=0.0):
-        self.frames, self.own_reward, self.t = frames, reward, 0
-
-    def __getattr__(self, name):
-        if name in ("puck", "position", "parts", "state", "is_success", "unwrapped_state"):
-            raise AssertionError(f"the simulator's state was read: {name}")
-        raise AttributeError(name)
-
-    def reset(self, seed=None, options=None):
-        self.t = 0
-        return self.frames[0], self.Info(object=[1.0, 2.0])
-
-    def step(self, action):
-        self.t += 1
-        return self.frames[self.t], self.own_reward, False, False, self.Info(is_success=True)
-
-
-def play(env, steps=20):
-    """Observations (steps + 1, S), rewards (steps,) of an episode; the actions do not matter."""
-    observations, rewards = [env.reset(seed=0)[0]], []
-    for _ in range(steps):
-        observation, r, *_ = env.step(np.zeros(3, np.float32))
-        observations.append(observation)
-        rewards.append(r)
-    return np.array(observations), np.array(rewards)
 
 
 def test_gymnasium_has_nothing_to_complain_about(reward):

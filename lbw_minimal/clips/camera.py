@@ -9,10 +9,10 @@ room is so bare that nothing tells, the camera is taken to stand.
 
 from __future__ import annotations
 
-from typing import Any
-
 import cv2
 import numpy as np
+
+from lbw_minimal.clips.corners import found_again
 
 LOOK_AT = 60  # frames that are followed, spread over the shot; between them it is interpolated
 CELLS = 12  # of the longer side: a cell has one vote, or a striped sleeve would outvote the room
@@ -84,11 +84,7 @@ def _followed(one, two, corners, step):
     if not len(corners):
         return corners[:, 0], corners[:, 0]
     guess = cv2.transform(corners, np.linalg.inv(step)[:2]).astype(np.float32)
-    how: dict[str, Any] = {"winSize": WINDOW, "flags": cv2.OPTFLOW_USE_INITIAL_FLOW}
-    there, ok, _ = cv2.calcOpticalFlowPyrLK(one, two, corners, guess, **how)
-    back, ok_back, _ = cv2.calcOpticalFlowPyrLK(two, one, there, corners.copy(), **how)
-    kept = (np.hstack([ok, ok_back]) > 0).all(1)
-    kept &= np.linalg.norm(back - corners, axis=2)[:, 0] < BACK
+    there, kept = found_again(one, two, corners, guess, corners, WINDOW, BACK)
     return corners[kept, 0], there[kept, 0]
 
 
