@@ -19,7 +19,7 @@ def graded(tmp_path, whole, odd, path=""):
         cwd=ROOT, capture_output=True, text=True,
         env=os.environ | {"PATH": f"{path}{os.pathsep}{os.environ['PATH']}"},
     )  # fmt: skip
-    return done.stdout.splitlines()[-1], done.stdout
+    return done.stdout.rpartition("\n")[0].rpartition("\n")[2], done.stdout + done.stderr
 
 
 @needs_sandbox
