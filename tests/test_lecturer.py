@@ -32,7 +32,7 @@ def outcome(points, message="", label="a check"):
 def exercise(id, points, message="", open=False):
     outcomes = [outcome(points, "" if points == 2 else message or "it is wrong")]
     return {"id": id, "title": find(id).title, "open": open, "points": points, "most": 2,
-            "outcomes": outcomes, "example": ""}  # fmt: skip
+            "outcomes": outcomes, "example": "", "source": ""}  # fmt: skip
 
 
 def record(name, *exercises, **more):
@@ -276,6 +276,18 @@ def test_the_quantile_counts_pairs_that_share_nothing():
 def test_in_a_class_of_two_nothing_is_said():
     class_ = alike.compare(["a", "b"], {"6.1": {0: ODD, 1: ODD}})
     assert class_.pairs == [] and "nothing can be said" in alike.alike_page(class_, [set(), set()])
+
+
+def test_what_is_compared_is_what_was_graded(tmp_path):
+    """The cell of each answer that was worked on; of a stub and of what is missing nothing."""
+    for name, source in (("ann", E61.source), ("bob", f"def r1(z, z_E):\n    {STUB}")):
+        (tmp_path / "class" / name).mkdir(parents=True)
+        (tmp_path / "class" / name / "06_reward.ipynb").write_text(notebook(source))
+    assert main([str(tmp_path / "class"), "--out", str(tmp_path / "out")]) == 0
+    graded = [json.loads(p.read_text()) for p in sorted(tmp_path.glob("out/*/result.json"))]
+    found = alike.answers(graded)
+    assert found.pop("6.1") == {0: f"# Exercise 6.1\n{E61.source}"}
+    assert found and not any(found.values())
 
 
 def test_the_page_shows_both_answers_and_says_what_is_wrong_alike():

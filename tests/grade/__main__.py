@@ -231,6 +231,9 @@ def grade(
         began = time.monotonic()
         results[ids.index(id)] = grade_one(known[id], answers[id], box, seed, left)
         left -= time.monotonic() - began
+    for result in results:
+        given = answers.get(result.id)
+        result.source = given.source if given and not (given.open or given.broken) else ""
     for (other, taken), some in twice.items():
         stand = "stand" if some[1:] else "stands"
         notes.append(f"{', '.join(some)} {stand} in {other}, too; that of {taken} was graded")

@@ -38,13 +38,15 @@ class Outcome:
 @dataclass
 class Result:
     """What became of an exercise. open: nobody has worked on it yet. example: the smallest input
-    that failed, as a call to paste, and what is wrong there; empty if there is none."""
+    that failed, as a call to paste, and what is wrong there; empty if there is none. source: the
+    cell that was graded; empty if nobody has worked on it."""
 
     id: str
     title: str
     outcomes: list[Outcome] = field(default_factory=list)
     open: bool = False
     example: str = ""
+    source: str = ""
 
     @property
     def points(self) -> float:

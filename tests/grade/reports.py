@@ -24,7 +24,7 @@ def reports(
     yield "items.csv", items.items_csv(found)
     yield "hints.csv", items.hints_csv(found)
     yield "items.html", items.items_page(found, len(grades) - len(items.tried(grades)))
-    class_ = alike.compare([g["submission"] for g in grades], alike.answers(entries, ids))
+    class_ = alike.compare([g["submission"] for g in grades], alike.answers(grades))
     wrong = [{e["id"] for e in g["exercises"] if e["points"] < e["most"]} for g in grades]
     yield "alike.csv", alike.alike_csv(class_)
     yield "alike.html", alike.alike_page(class_, wrong)

@@ -122,13 +122,16 @@ def is_stub(node) -> bool:
     """Whether a function, or each one in a class, has nothing but the line that was handed out."""
     if not isinstance(node, ast.FunctionDef | ast.ClassDef):
         return False
+    if isinstance(node, ast.FunctionDef) and not _is_bare(node.body):
+        return False
     bodies = [n.body for n in ast.walk(node) if isinstance(n, ast.FunctionDef)]
     return bool(bodies) and all(map(_is_bare, bodies))
 
 
 def _is_bare(body) -> bool:
     says = isinstance(body[0], ast.Expr) and isinstance(body[0].value, ast.Constant)
-    return len(body) == 1 + says and ast.unparse(body[-1]) == STUB_TEXT
+    bare = len(body) == 1 + says and isinstance(body[-1], ast.Raise)
+    return bare and ast.unparse(body[-1]) == STUB_TEXT
 
 
 STUB_TEXT = ast.unparse(ast.parse(STUB))
