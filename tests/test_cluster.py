@@ -248,7 +248,11 @@ def test_what_a_node_refuses_another_does_and_it_is_said(nodes, capsys):
 
 
 def test_a_sandbox_that_does_not_hold_is_found(monkeypatch):
-    failing, command = sandbox.failing.__wrapped__, sandbox.command
+    def failing():
+        with sandbox.Sandbox() as box:
+            return sandbox.failing(box)
+
+    command = sandbox.command
     monkeypatch.setattr("shutil.which", lambda name: None)  # Landlock alone, or nothing
     assert bool(failing()) != sandbox.has_landlock()
     monkeypatch.setattr(sandbox, "command", lambda fd: [*command(fd), "/"])
@@ -258,7 +262,7 @@ def test_a_sandbox_that_does_not_hold_is_found(monkeypatch):
 
 
 def test_a_node_without_a_sandbox_does_not_grade(monkeypatch):
-    monkeypatch.setattr(sandbox, "failing", lambda: "its sandbox does not start")
+    monkeypatch.setattr(tests.grade.cluster, "_failing", lambda: "its sandbox does not start")
     with pytest.raises(cluster.Refused, match="its sandbox does not start"):
         grade_here([], [], "", ["6.1"], 2, False)
 
