@@ -181,6 +181,11 @@ osc.mistake(
     "J.T @ task_inertia(J, M) @ (kp * e - kd * v)",
     "M @ (np.linalg.pinv(J) @ (kp * e - kd * v))",
 )
+osc.mistake(
+    "The 2 stands before the root: k_d = 2 sqrt(k_p).",
+    "2 * np.sqrt(kp)",
+    "np.sqrt(2 * kp)",
+)
 
 
 @exercise("1.4", "Torques the tip does not feel", given=(task_inertia,))

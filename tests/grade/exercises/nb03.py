@@ -227,6 +227,32 @@ make_push.mistake(
 make_push.mistake(
     "Return the table first, then the cube.", "return table, cube", "return cube, table"
 )
+make_push.mistake(
+    "halfExtents are half the edges: your cube is twice as large, and its middle as high as that "
+    "asks for.",
+    "halfExtents=(0.025, 0.025, 0.025)",
+    "halfExtents=(0.05, 0.05, 0.05)",
+    "(0.53, 0, 0.025)",
+    "(0.53, 0, 0.05)",
+)
+make_push.mistake(
+    "halfExtents are half the edges: your table and your cube are twice as large, and their "
+    "middles where that asks for.",
+    "halfExtents=(0.8, 0.3, 0.02)",
+    "halfExtents=(1.6, 0.6, 0.04)",
+    "(0.8, 0, -0.02)",
+    "(0.8, 0, -0.04)",
+    "halfExtents=(0.025, 0.025, 0.025)",
+    "halfExtents=(0.05, 0.05, 0.05)",
+    "(0.53, 0, 0.025)",
+    "(0.53, 0, 0.05)",
+)
+make_push.mistake(
+    "The table has friction 1.0. Bullet multiplies the two: 0.6 on both makes 0.36 where they "
+    "touch.",
+    "table, -1, lateralFriction=1.0",
+    "table, -1, lateralFriction=0.6",
+)
 
 
 @exercise("3.3", "How often does it move?")
@@ -298,6 +324,12 @@ moving_share.mistake(
     "Your loop stops before the last take: the range has to reach the end.",
     "x.reshape(-1, take)",
     "x.reshape(-1, take)[:-1]",
+)
+moving_share.mistake(
+    "The frames of a take are neighbours in x, and reshape fills row by row: x.reshape(-1, take) "
+    "has a take in each row.",
+    "x.reshape(-1, take)",
+    "x.reshape(take, -1).T",
 )
 
 

@@ -136,6 +136,14 @@ speeds.mistake(
     "distance - slack, distance + slack",
     "distance * (1 - slack), distance * (1 + slack)",
 )
+speeds.mistake(
+    "The distance grows as the square of the speed: take the slack from the distance before the "
+    "root, and not the same share from the speed.",
+    "low, high = distance - slack, distance + slack",
+    "v, share = np.sqrt(2 * mu * g * distance), slack / distance",
+    "np.sqrt(2 * mu * g * max(low, 0)), np.sqrt(2 * mu * g * high)",
+    "v * max(1 - share, 0), v * (1 + share)",
+)
 
 
 @exercise("7.3", "Friction from a track")

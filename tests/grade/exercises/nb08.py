@@ -208,6 +208,17 @@ share_inside.mistake(
     "video.astype(float)",
     "video.astype(np.int16)",
 )
+share_inside.mistake(
+    "You compare the means inside and outside; the share is of the sums, of all pixels there.",
+    "energy[mask].sum() / energy.sum()",
+    "energy[mask].mean() / (energy[mask].mean() + energy[~mask].mean())",
+)
+share_inside.mistake(
+    "uint8 has no negative numbers: a difference of -1 counts as 255, and squares wrap around, "
+    "too. Use floats.",
+    "video.astype(float)",
+    "video",
+)
 
 
 @exercise("8.1", "Slide or tip")

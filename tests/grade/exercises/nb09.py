@@ -140,6 +140,12 @@ make_drawer.mistake(
     "(0.05, 0.08, 0.04)",
     "(0.025, 0.04, 0.02)",
 )
+make_drawer.mistake(
+    "It runs through its end, braked: PyBullet forgets limits that come without jointDamping in "
+    "the same call, and keeps its own damping of the joint.",
+    "        jointDamping=0,\n",
+    "",
+)
 
 
 @exercise("9.2", "What the policy sees")

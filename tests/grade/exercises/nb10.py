@@ -409,3 +409,8 @@ verdict.mistake(
     "if not expert.all():",
     "if expert.all() is False:",
 )
+verdict.mistake(
+    "The first reason counts, in the order of the text: chance is asked about before the expert.",
+    "if random.mean() > 0.05:",
+    "if expert.all() and random.mean() > 0.05:",
+)

@@ -280,6 +280,13 @@ swap.mistake(
     "elif coin < 0.5:",
     "elif next(coins) < 0.5:\n            place = next(places)",
 )
+swap.mistake(
+    "Whether there is room is asked anew for each image: the pool can fill up within a batch.",
+    "pool, shown = list(pool), []",
+    "pool, shown = list(pool), []\n    room = len(pool) < size",
+    "if len(pool) < size:",
+    "if room:",
+)
 
 
 @exercise(
@@ -420,6 +427,24 @@ mixup_loss.mistake(
     "the other way round.",
     "own * images + (1 - own) * images[partner]",
     "(1 - own) * images + own * images[partner]",
+)
+mixup_loss.mistake(
+    "The logarithm of a sigmoid that has rounded to 0 is minus infinity: "
+    "binary_cross_entropy_with_logits takes the logits and is exact at any size.",
+    "return F.binary_cross_entropy_with_logits(classify(mixed), target)",
+    "c = torch.sigmoid(classify(mixed))\n"
+    "    return -(target * c.log() + (1 - target) * (1 - c).log()).mean()",
+)
+mixup_loss.mistake(
+    "A sigmoid that is kept from 0 and 1 bounds the loss and ends its gradient: give the logits "
+    "to binary_cross_entropy_with_logits.",
+    "F.binary_cross_entropy_with_logits(classify(mixed), target)",
+    "F.binary_cross_entropy(torch.sigmoid(classify(mixed)).clamp(1e-7, 1 - 1e-7), target)",
+)
+mixup_loss.mistake(
+    "The share is taken as it is given: the larger of s and 1 - s is another method's.",
+    "own = share.view(-1, 1, 1, 1)",
+    "share = torch.maximum(share, 1 - share)\n    own = share.view(-1, 1, 1, 1)",
 )
 
 

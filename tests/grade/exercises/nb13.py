@@ -177,6 +177,28 @@ object_points.mistake(
     "> gone",
     "> still",
 )
+object_points.mistake(
+    "You ask about one frame; the object is near its start in EVERY frame of the first quarter.",
+    "(far[: len(paths) // 4] < still).all(axis=0)",
+    "(far[len(paths) // 4] < still)",
+)
+object_points.mistake(
+    "That is one frame more than the first quarter: its frames are 0 to T // 4 - 1.",
+    "len(paths) // 4",
+    "len(paths) // 4 + 1",
+)
+object_points.mistake(
+    "Resting is to stay near the start, paths[0]. You compare each frame with the one before, and "
+    "what drifts slowly rests.",
+    "(far[: len(paths) // 4] < still)",
+    "(np.linalg.norm(np.diff(paths, axis=0), axis=2)[: len(paths) // 4] < still)",
+)
+object_points.mistake(
+    "Each frame of the first quarter has to be near the start; the mean over them forgives a "
+    "twitch.",
+    "(far[: len(paths) // 4] < still).all(axis=0)",
+    "(far[: len(paths) // 4].mean(axis=0) < still)",
+)
 
 
 @exercise("13.3", "Lost and found")
@@ -257,6 +279,17 @@ lost_and_found.mistake(
     "x and y have a median each: over the points, axis 0.",
     "axis=0",
     "axis=None",
+)
+lost_and_found.mistake(
+    "x and y have a median each: axis=0.",
+    "np.median((to - p_0)[kept], axis=0)",
+    "np.median((to - p_0)[kept]) * np.ones(2)",
+)
+lost_and_found.mistake(
+    "The median of an even number of points lies between the middle two: np.median takes it, "
+    "torch.median the lower one.",
+    "np.median((to - p_0)[kept], axis=0)",
+    "np.sort((to - p_0)[kept], axis=0)[(kept.sum() - 1) // 2]",
 )
 
 
@@ -364,4 +397,15 @@ reward.mistake(
     "The weights belong to r1, r2 and r3 in this order.",
     "lam[0] * r1 + lam[1] * r2 + lam[2] * r3",
     "lam[2] * r1 + lam[1] * r2 + lam[0] * r3",
+)
+reward.mistake(
+    "When the demonstration has ended it stands still: both of its frames are then the last one, "
+    "and its step is 0. Yours goes on with its last step.",
+    "now, goal = d_E[min(t, last)], d_E[min(t + 1, last)]",
+    "now, goal = d_E[min(t, last - 1)], d_E[min(t + 1, last)]",
+)
+reward.mistake(
+    "The length is cut off at 2 L, and not each of its coordinates.",
+    "min(np.linalg.norm(x), 2 * L) / L",
+    "np.linalg.norm(np.clip(x, -2 * L, 2 * L)) / L",
 )
