@@ -353,7 +353,8 @@ transport.mistake(
     "(1 - torch.maximum(h_x, h_y))",
 )
 transport.mistake(
-    "The values are right, but what is pasted keeps its gradient: y's features are what is learnt.",
+    "The values are right, but no gradient reaches y's features, and they are what is learnt: no "
+    "detach there.",
     "h_y * phi_y",
     "h_y * phi_y.detach()",
 )
@@ -400,7 +401,7 @@ loss.mistake(
     ".abs().sum(1, keepdim=True)",
 )
 loss.mistake(
-    "m has one number a pixel; you take the mean over the whole picture, too.",
+    "A pixel's weight has to meet that pixel's own error; yours is a mean over the picture before.",
     ".abs().mean(1, keepdim=True)",
     ".abs().mean()",
 )

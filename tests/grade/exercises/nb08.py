@@ -156,7 +156,8 @@ share_inside.mistake(
     "100 * energy[mask].sum() / energy.sum()",
 )
 share_inside.mistake(
-    "uint8 has no negative numbers: a pixel that gets darker by 1 counts as 255. Use floats.",
+    "uint8 has no negative numbers: a pixel that gets darker by 1 counts as 255. Make the video "
+    "floats before you subtract.",
     "video.astype(float)",
     "video",
     ") ** 2)",
@@ -215,7 +216,7 @@ share_inside.mistake(
 )
 share_inside.mistake(
     "uint8 has no negative numbers: a difference of -1 counts as 255, and squares wrap around, "
-    "too. Use floats.",
+    "too. Make the video floats before you subtract.",
     "video.astype(float)",
     "video",
 )
