@@ -148,7 +148,9 @@ chance.check("any policy, any number of episodes", _luck, points=2)
 chance.check("all of ten", lambda rng: (float(rng.uniform(0.5, 0.99)), 10, 10))
 chance.check("at least none is certain", lambda rng: (float(rng.uniform(0, 1)), 10, 0))
 chance.mistake(
-    "At least k includes k itself; yours is the chance of more than k.", "range(k, n + 1)", "range(k + 1, n + 1)"
+    "At least k includes k itself; yours is the chance of more than k.",
+    "range(k, n + 1)",
+    "range(k + 1, n + 1)",
 )
 chance.mistake(
     "At least k means all counts from k to n; yours is exactly k.",
