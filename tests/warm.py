@@ -1,9 +1,10 @@
 """Runs test files again and again without importing torch again: `python -m tests.warm`.
 
-In, a line of JSON for each run: test files or tests, names to leave out, and how many seconds each
+In, a line of JSON for each run: test files, or tests in their order, and how many seconds each
 test is known to take. Out, a line for each: whether all passed, the first that did not, and the
 seconds of those that did. Every run is a fork of this process, which has imported what is large and
-not the kit's own; it ends at the first failure.
+not the kit's own; it ends at the first failure. With "cover" it ends at none, and says which lines
+of the kit each test has run.
 
 Seconds are of processor time, so that a busy machine changes neither the order nor the limits.
 """
@@ -13,19 +14,19 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import re
 import signal
 import tempfile
-from bisect import bisect
 
+import coverage
 import pytest
+
+from tests.by_line import KIT
 
 # torch's dynamo comes with the first optimizer, and takes 2 s.
 MODULES = (
     *("av", "cv2", "gymnasium.wrappers", "matplotlib", "meshcat", "numpy", "PIL"),
     *("safetensors.torch", "torch.nn", "torch._dynamo"),
 )
-BANDS = (0.2, 1.0, 5.0)  # s: brief tests first, and within a band as they stand
 NO_TESTS = pytest.ExitCode.NO_TESTS_COLLECTED
 SLACK, LEAST, UNKNOWN = 5, 20, 60  # a test hangs after 5 times its own seconds, 20 s at least
 
@@ -36,15 +37,15 @@ def spent() -> float:
 
 
 class Watch:
-    """A plugin: orders the tests, ends one that hangs, and writes down how each went."""
+    """A plugin: keeps the order asked, ends a test that hangs, and writes down how each went."""
 
-    def __init__(self, without: list[str], seconds: dict[str, float], out: int):
-        self.without, self.seconds, self.out = set(without), seconds, out
+    def __init__(self, tests: list[str], seconds: dict[str, float], out: int):
+        self.ranks = {test: rank for rank, test in enumerate(tests)}
+        self.seconds, self.out = seconds, out
 
     @pytest.hookimpl(trylast=True)
     def pytest_collection_modifyitems(self, items):
-        items[:] = [i for i in items if not self.without & set(re.split(r"\W", i.name.lower()))]
-        items.sort(key=lambda i: bisect(BANDS, self.seconds.get(i.nodeid, BANDS[0])))
+        items.sort(key=lambda item: self.ranks.get(item.nodeid, 0))
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_protocol(self, item):
@@ -73,19 +74,49 @@ class Watch:
         os.write(self.out, (json.dumps(what) + "\n").encode())
 
 
-def child(out: int, tests: list[str], without: list[str], seconds: dict[str, float]) -> None:
+class Cover:
+    """A plugin: writes down the lines of the kit that each test runs, its fixtures among them."""
+
+    def __init__(self):
+        self.coverage = coverage.Coverage(data_file=None, source=list(KIT), config_file=False)
+        self.coverage.start()
+
+    @pytest.hookimpl(wrapper=True)
+    def pytest_runtest_protocol(self, item):
+        self.coverage.switch_context(item.nodeid)
+        done = yield
+        self.coverage.switch_context("")
+        return done
+
+    def lines(self) -> dict[str, dict[str, list[int]]]:
+        """{file: {test: [line, ...]}}"""
+        self.coverage.stop()
+        data, found = self.coverage.get_data(), {}
+        for file in data.measured_files():
+            for line, tests in data.contexts_by_lineno(file).items():
+                for test in filter(None, tests):
+                    found.setdefault(file, {}).setdefault(test, []).append(line)
+        return found
+
+
+def child(out: int, watch: Watch, tests: list[str], cover: bool) -> None:
     """Run the tests in this process, and leave it."""
     os.setsid()
-    line = ["-q", "-x", "-p", "no:cacheprovider", "-m", "not slow and not peers", *tests]
-    os._exit(pytest.main(line, plugins=[Watch(without, seconds, out)]))
+    line = ["-q", "-p", "no:cacheprovider", "-m", "not slow and not peers", *tests]
+    if cover:
+        covered = Cover()
+        pytest.main(line, plugins=[watch, covered])
+        watch.tell(lines=covered.lines())
+        os._exit(0)
+    os._exit(pytest.main(["-x", *line], plugins=[watch]))
 
 
-def run(tests: list[str], without: list[str], seconds: dict[str, float]) -> dict:
+def run(tests: list[str], seconds: dict[str, float] | None = None, cover: bool = False) -> dict:
     """{"passed": bool, "by": the first test that failed or hung, "why", "seconds": {test: s}}."""
     with tempfile.TemporaryFile() as file:
         pid = os.fork()
         if pid == 0:
-            child(file.fileno(), tests, without, seconds)
+            child(file.fileno(), Watch(tests, seconds or {}, file.fileno()), tests, cover)
         status = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
         with contextlib.suppress(ProcessLookupError):
             os.killpg(pid, signal.SIGKILL)  # what the tests left running
@@ -93,6 +124,10 @@ def run(tests: list[str], without: list[str], seconds: dict[str, float]) -> dict
         told = [json.loads(line) for line in file]
     took = {t["ended"]: t["seconds"] for t in told if "ended" in t}
     answer = {"passed": status in (0, NO_TESTS), "by": "", "why": "", "seconds": took}
+    if cover:
+        lines = next((t["lines"] for t in told if "lines" in t), {})
+        failed = [t["failed"] for t in told if "failed" in t]
+        return answer | {"lines": lines, "failed": failed, "root": os.getcwd()}
     for failed in (t for t in told if "failed" in t):
         return answer | {"by": failed["failed"], "why": failed["why"]}
     if not answer["passed"]:

@@ -1,0 +1,136 @@
+"""Which tests run which lines: for `make mutants`, which so asks none that cannot notice a fault.
+
+Each test file runs once under coverage.py, which writes down the lines that each test has run. A
+constant runs when its file is imported, in no test: it is met by the tests of the lines that name
+it, in whatever file they are, and a function's head by those of its body.
+"""
+
+from __future__ import annotations
+
+import ast
+import json
+import re
+from bisect import bisect
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).parent.parent
+KIT = ("lbw_minimal", "tasks")
+USES_KIT = re.compile(r"^ *(from|import) (lbw_minimal|tasks)\b", re.M)
+# The house's rules are of the text, and three others need what is not there.
+NOT_ASKED = {"test_house.py", "test_builds.py", "test_cluster.py", "test_systems.py"}
+BUDGET = 60.0  # s of processor time that the tests of one fault may take, by what they took before
+
+
+def asked() -> list[str]:
+    """The test files that use the kit's code themselves."""
+    files = sorted((ROOT / "tests").glob("test_*.py"))
+    return [
+        f"tests/{path.name}"
+        for path in files
+        if path.name not in NOT_ASKED and USES_KIT.search(path.read_text())
+    ]
+
+
+def measure(run: Callable[..., dict], out: Path) -> dict:
+    """{"lines": {file: {test: [line, ...]}}, "seconds": {test: s}} of all tests, kept in a file.
+
+    A test that fails without a fault is left out. `run` asks `tests.warm`.
+    """
+    known = json.loads(out.read_text()) if out.exists() else {"lines": {}, "seconds": {}, "of": []}
+    out.parent.mkdir(exist_ok=True)
+    for tests in (file for file in asked() if file not in known["of"]):
+        answer = run(tests=[tests], cover=True)
+        for file, by_test in answer["lines"].items():
+            rows = known["lines"].setdefault(str(Path(file).relative_to(answer["root"])), {})
+            rows |= {t: lines for t, lines in by_test.items() if t not in answer["failed"]}
+        known["seconds"] |= {
+            t: s for t, s in answer["seconds"].items() if t not in answer["failed"]
+        }
+        known["of"].append(tests)
+        out.write_text(json.dumps(known))
+        print(f"{tests}: {len(answer['seconds'])} tests, {len(answer['failed'])} fail", flush=True)
+    return known
+
+
+class Lines:
+    """What runs the lines of the kit, from `measure`."""
+
+    def __init__(self, known: dict):
+        self.seconds = known["seconds"]
+        self.by_line: dict[tuple[str, int], set[str]] = {}
+        for file, by_test in known["lines"].items():
+            for test, lines in by_test.items():
+                for line in lines:
+                    self.by_line.setdefault((file, line), set()).add(test)
+        self.code = {
+            str(path.relative_to(ROOT)): path.read_text().splitlines()
+            for folder in KIT
+            for path in (ROOT / folder).rglob("*.py")
+        }
+
+    def tests(self, file: str, line: int) -> list[str]:
+        """The tests that can notice a fault in a line, the likeliest and cheapest first.
+
+        Behind those that run it come the others of their files, which may share what it made.
+        What goes beyond the budget is left out.
+        """
+        running = self.running(file, line)
+        beside = {t.split("::")[0] for t in running}
+        shared = {t for t in self.seconds if t.split("::")[0] in beside} - running
+        own = f"tests/test_{Path(file).stem}.py"
+        bands = (0.2, 1.0, 5.0)
+
+        def rank(test: str) -> tuple:
+            seconds = self.seconds[test]
+            return test in shared, bisect(bands, seconds), not test.startswith(own), seconds
+
+        chosen, spent = [], 0.0
+        for test in sorted(running | shared, key=rank):
+            spent += self.seconds[test]
+            if spent < BUDGET or not chosen:
+                chosen.append(test)
+        return chosen
+
+    def running(self, file: str, line: int) -> set[str]:
+        """The tests that run the statement of a line, or else what names it."""
+        first, last, names = statement(ast.parse("\n".join(self.code[file])), line)
+        tests = self.of_lines((file, n) for n in range(first, last + 1))
+        if not tests:
+            word = re.compile(rf"\b({'|'.join(names)})\b")
+            tests = self.of_lines(
+                (other, n)
+                for other, text in self.code.items()
+                for n, code in enumerate(text, 1)
+                if names and word.search(code)
+            )
+        return tests or self.of_lines(place for place in self.by_line if place[0] == file)
+
+    def of_lines(self, places: Iterator[tuple[str, int]]) -> set[str]:
+        return set().union(*(self.by_line.get(place, ()) for place in places))
+
+
+def statement(tree: ast.Module, line: int) -> tuple[int, int, list[str]]:
+    """First and last line of the innermost statement at a line, and the names that it gives.
+
+    Of a `for`, `if` or `with` it is the head alone, of a function all.
+    """
+    around = [n for n in ast.walk(tree) if isinstance(n, ast.stmt) and _holds(n, line)]
+    if not around:
+        return line, line, []
+    node = max(around, key=lambda n: (n.lineno, -n.end_lineno))
+    last = node.end_lineno
+    if hasattr(node, "body") and not isinstance(node, ast.FunctionDef | ast.ClassDef):
+        last = max(node.lineno, node.body[0].lineno - 1)
+    targets = getattr(node, "targets", [getattr(node, "target", node)])
+    names = [
+        part.id if isinstance(part, ast.Name) else part.name
+        for target in targets
+        for part in ([target] if hasattr(target, "name") else ast.walk(target))
+        if isinstance(part, ast.Name) or hasattr(part, "name")
+    ]
+    return node.lineno, last, names
+
+
+def _holds(node: ast.stmt, line: int) -> bool:
+    return node.lineno <= line <= node.end_lineno
