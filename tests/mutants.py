@@ -2,13 +2,12 @@
 
 Operators are Cosmic Ray's, and four of ours for what a refactoring breaks: a constant twice or half
 as large, a call's first two arguments swapped, a step left out, a call that passes its argument on.
-A place of the code is drawn
-at random and then one of the operators that fit it, so that a line with many operators does not
-count more. Each mutant lives in a copy of the tree and meets the tests that run its line
-(`tests.by_line`), in a process that has torch already (`tests.warm`): the brief ones first, up to
-the first that fails, and a minute's worth of them. What others would notice is not counted: the
-score is a lower bound. A smaller `--count` takes the first of the same sample. Results that are
-there are gone on with, and so are the lines that tests run, in `runs/`.
+A place of the code is drawn at random and then one of the operators that fit it, so that a line
+with many operators does not count more. Each mutant lives in a copy of the tree and meets the tests
+that run its line (`tests.by_line`), in a process that has torch already (`tests.warm`): the brief
+ones first, up to the first that fails, and twenty seconds' worth of them. What others would notice
+is not counted: the score is a lower bound. A smaller `--count` takes the first of the same sample.
+Results that are there are gone on with, and so are the lines that tests run, in `runs/`.
 """
 
 from __future__ import annotations

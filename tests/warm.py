@@ -26,6 +26,7 @@ from tests.by_line import KIT
 MODULES = (
     *("av", "cv2", "gymnasium.wrappers", "matplotlib", "meshcat", "numpy", "PIL"),
     *("safetensors.torch", "torch.nn", "torch._dynamo"),
+    *("matplotlib.figure", "mistune", "pybullet", "pybullet_utils.bullet_client"),
 )
 NO_TESTS = pytest.ExitCode.NO_TESTS_COLLECTED
 SLACK, LEAST, UNKNOWN = 5, 20, 60  # a test hangs after 5 times its own seconds, 20 s at least
