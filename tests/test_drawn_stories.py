@@ -1,0 +1,132 @@
+"""What happens in drawings, before a camera sees it: who moves what, and when."""
+
+import numpy as np
+import pytest
+
+from lbw_minimal.clips import drawings
+from lbw_minimal.clips.drawings import SIZE
+
+T = 60
+SEEDS = range(40)
+
+
+def story(kind, seed):
+    return drawings._story(np.random.default_rng(seed), kind, T)
+
+
+def ways(told):
+    """The object's way (2,), its length, and the share of it that is gone in each frame (T,)."""
+    way = told.object[-1] - told.object[0]
+    length = np.linalg.norm(way)
+    return way, length, (told.object - told.object[0]) @ way / length**2
+
+
+def under_way(told):
+    """The frames in which the object moves, without the ends of that."""
+    share = ways(told)[2]
+    return np.flatnonzero((share > 0.03) & (share < 0.97))
+
+
+def test_a_hand_moves_as_hands_do_and_rests_before_and_after():
+    t = np.array([-1.0, 0, 0.25, 0.5, 0.75, 1, 2])
+    half = 0.25**3 * (10 - 15 * 0.25 + 6 * 0.25**2)
+    np.testing.assert_allclose(drawings._ease(t), [0, 0, half, 0.5, 1 - half, 1, 1])
+
+
+def test_the_move_begins_when_the_hand_is_there_and_the_hand_leaves_when_it_is_over():
+    time, rests = np.linspace(0, 1, 400)[:, None], []
+    for seed in SEEDS:
+        begin, approach, move, retreat = drawings._phases(np.random.default_rng(seed), time)
+        assert (approach[move > 0] == 1).all() and (move[time <= begin] == 0).all()
+        assert (move[retreat > 0] == 1).all() and move[-1] == 1
+        for part in (approach, move, retreat):
+            assert (np.diff(part[:, 0]) >= 0).all()
+        rests.append((begin == pytest.approx(0, abs=0.05), retreat[-1, 0] < 0.5))
+    touched, stayed = np.mean(rests, axis=0)
+    # A quarter of the clips begins with the touch; a retreat of an instant is over at the end.
+    assert 0.1 < touched < 0.5 and stayed == 0
+
+
+@pytest.mark.parametrize("kind", ["push", "hit", "alone"])
+def test_an_object_goes_straight_and_never_back_from_and_to_a_place_in_the_picture(kind):
+    for seed in SEEDS:
+        told = story(kind, seed)
+        way, length, share = ways(told)
+        assert 7 <= length <= 45.01 and (np.diff(share) > -1e-9).all()
+        assert (told.object[[0, -1], 0] >= 10).all()
+        assert (told.object[[0, -1], 0] <= SIZE - 6).all()
+        aside = (told.object - told.object[0]) @ (-way[1], way[0]) / length
+        assert np.abs(aside).max() < 1e-6
+
+
+def test_some_carried_objects_are_lifted_and_put_down_again():
+    lifted = 0
+    for seed in SEEDS:
+        told = story("carry", seed)
+        way, *_ = ways(told)
+        if abs(way[0]) < 3:
+            continue
+        share = (told.object[:, 0] - told.object[0, 0]) / way[0]
+        above = told.object[0, 1] + share * way[1] - told.object[:, 1]
+        assert above.min() > -1e-6 and abs(above[-1]) < 1e-6
+        lifted += above.max() > 1
+    assert 4 <= lifted <= 20  # 30 % of 40
+
+
+@pytest.mark.parametrize("kind", ["push", "carry"])
+def test_who_pushes_or_carries_stays_where_it_touches(kind):
+    for seed in SEEDS:
+        told = story(kind, seed)
+        beside = (told.tip - told.object)[under_way(told)]
+        assert np.ptp(beside, axis=0).max() < 1e-6
+
+
+def test_who_pushes_or_hits_is_behind_the_object_when_it_goes():
+    for kind in ("push", "hit"):
+        for seed in SEEDS:
+            told = story(kind, seed)
+            way, length, _ = ways(told)
+            first = under_way(told)[0]
+            behind = (told.object - told.tip)[first] @ way / length
+            assert behind > 0 and behind < np.abs(told.half).sum() + 3
+
+
+def test_a_hit_object_goes_on_ever_slower_and_the_hand_four_pixels_at_most():
+    hand = []
+    for seed in SEEDS:
+        told = story("hit", seed)
+        steps = np.linalg.norm(np.diff(told.object, axis=0), axis=1)
+        moving = steps[steps > 1e-9]
+        assert (np.diff(moving[1:]) < 1e-9).all()  # the first may have begun between frames
+        hand.append(np.linalg.norm(told.tip[-2] - told.tip[under_way(told)[0]]))
+    assert np.median(hand) < 4  # three in five stay there to the end
+
+
+def test_a_hand_comes_from_elsewhere_and_what_it_leans_on_comes_along():
+    """At the start it is away from where it touches; shoulders stand out of the picture."""
+    away = [np.linalg.norm(story("push", s).tip[0] - story("push", s).tip[T // 2]) for s in SEEDS]
+    assert np.median(away) > 8
+    outside = 0
+    for seed in SEEDS:
+        told = story("push", seed)
+        shoulder = told.shoulder[under_way(told)[0]]
+        outside += ((shoulder < 8) | (shoulder > SIZE)).any()
+    assert outside > 36
+
+
+def test_a_drawer_is_shut_where_its_way_ends_if_it_is_pushed_and_begins_if_it_is_pulled():
+    for seed in SEEDS:
+        told = story("drawer", seed)
+        right = told.object[-1, 0] > told.object[0, 0]
+        np.testing.assert_allclose(told.closed, told.object[-1 if right else 0], atol=1e-9)
+        assert 1 <= told.half[0] <= 8 and 2 <= told.half[1] <= 12  # high rather than wide
+
+
+def test_a_shadow_is_where_the_arm_is_moved_by_its_fall():
+    layer = np.zeros((SIZE, SIZE, 4), np.uint8)
+    layer[20:40, 20:40] = 255
+    lit = drawings._lit(layer, 0.4, np.array([10.0, 5.0]), 0.5)
+    assert lit.shape == (SIZE, SIZE, 1)
+    assert lit[35, 40, 0] == pytest.approx(0.6, abs=1e-3)
+    assert lit[22, 25, 0] == 1 and lit[70, 70, 0] == 1
+    assert drawings._lit(layer, 0.0, np.zeros(2), 1.0) == 1
