@@ -19,7 +19,7 @@ KIT = ("lbw_minimal", "tasks")
 USES_KIT = re.compile(r"^ *(from|import) (lbw_minimal|tasks)\b", re.M)
 # The house's rules are of the text, and three others need what is not there.
 NOT_ASKED = {"test_house.py", "test_builds.py", "test_cluster.py", "test_systems.py"}
-BUDGET = 20.0  # s of processor time that the tests of one fault may take, by what they took before
+BUDGET = 10.0  # s of processor time that the tests of one fault may take, by what they took before
 
 
 def asked() -> list[str]:
@@ -94,9 +94,9 @@ class Lines:
 
     def running(self, file: str, line: int) -> set[str]:
         """The tests that run the statement of a line, or else what names it."""
-        first, last, names = statement(ast.parse("\n".join(self.code[file])), line)
+        first, last, names, at_import = statement(ast.parse("\n".join(self.code[file])), line)
         tests = self.of_lines((file, n) for n in range(first, last + 1))
-        if not tests:
+        if at_import or not tests:
             word = re.compile(rf"\b({'|'.join(names)})\b")
             tests = self.of_lines(
                 (other, n)
@@ -110,14 +110,15 @@ class Lines:
         return set().union(*(self.by_line.get(place, ()) for place in places))
 
 
-def statement(tree: ast.Module, line: int) -> tuple[int, int, list[str]]:
-    """First and last line of the innermost statement at a line, and the names that it gives.
+def statement(tree: ast.Module, line: int) -> tuple[int, int, list[str], bool]:
+    """First and last line of the innermost statement at a line, the names that it gives, and
+    whether it runs when the file is imported.
 
     Of a `for`, `if` or `with` it is the head alone, of a function all.
     """
     around = [n for n in ast.walk(tree) if isinstance(n, ast.stmt) and _holds(n, line)]
     if not around:
-        return line, line, []
+        return line, line, [], True
     node = max(around, key=lambda n: (n.lineno, -n.end_lineno))
     last = node.end_lineno
     if hasattr(node, "body") and not isinstance(node, ast.FunctionDef | ast.ClassDef):
@@ -129,7 +130,8 @@ def statement(tree: ast.Module, line: int) -> tuple[int, int, list[str]]:
         for part in ([target] if hasattr(target, "name") else ast.walk(target))
         if isinstance(part, ast.Name) or hasattr(part, "name")
     ]
-    return node.lineno, last, names
+    at_import = not any(isinstance(n, ast.FunctionDef) for n in around)
+    return node.lineno, last, names, at_import
 
 
 def _holds(node: ast.stmt, line: int) -> bool:

@@ -5,7 +5,7 @@ as large, a call's first two arguments swapped, a step left out, a call that pas
 A place of the code is drawn at random and then one of the operators that fit it, so that a line
 with many operators does not count more. Each mutant lives in a copy of the tree and meets the tests
 that run its line (`tests.by_line`), in a process that has torch already (`tests.warm`): the brief
-ones first, up to the first that fails, and twenty seconds' worth of them. What others would notice
+ones first, up to the first that fails, and ten seconds' worth of them. What others would notice
 is not counted: the score is a lower bound. A smaller `--count` takes the first of the same sample.
 Results that are there are gone on with, and so are the lines that tests run, in `runs/`.
 """
