@@ -1,0 +1,171 @@
+"""What a run is asked to do, piece by piece: folders, settings, files, numbers."""
+
+import json
+from argparse import Namespace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import tasks
+from lbw_minimal.imitate import Recipe
+from lbw_minimal.training import InputError
+from tasks.commands import job
+from tasks.commands.job import METHODS, fields_of, prepare_folder, read_number, videos
+
+
+def test_a_new_run_clears_an_older_runs_results_and_nothing_else(tmp_path):
+    prepare_folder(tmp_path, {"seed": 0}, resume=False)
+    old = ("policy.checkpoint", "policy.frames", "policy.safetensors", "policy_log.json",
+           "metrics.json", "report.html", "prepare.html", "reenactment.mp4")  # fmt: skip
+    for name in (*old, "thesis.txt", "notes.json"):
+        (tmp_path / name).write_text("")
+    assert prepare_folder(tmp_path, {"seed": 1}, resume=False) == tmp_path
+    assert {p.name for p in tmp_path.iterdir()} == {"thesis.txt", "notes.json", "settings.json"}
+    assert json.loads((tmp_path / "settings.json").read_text()) == {"seed": 1}
+
+
+def test_what_looks_like_results_in_a_folder_without_a_run_is_somebody_elses(tmp_path):
+    (tmp_path / "metrics.json").write_text("a thesis")
+    prepare_folder(tmp_path, {"seed": 0}, resume=False)
+    assert (tmp_path / "metrics.json").read_text() == "a thesis"
+
+
+def test_a_run_is_gone_on_with_by_its_own_settings_alone(tmp_path):
+    with pytest.raises(InputError, match="there is no run to resume"):
+        prepare_folder(tmp_path, {"seed": 0}, resume=True)
+    prepare_folder(tmp_path, {"seed": 0}, resume=False)
+    (tmp_path / "policy.checkpoint").write_text("half of it")
+    assert prepare_folder(tmp_path, {"seed": 0}, resume=True) == tmp_path
+    assert (tmp_path / "policy.checkpoint").read_text() == "half of it"
+    with pytest.raises(InputError, match="that run had other settings"):
+        prepare_folder(tmp_path, {"seed": 1}, resume=True)
+
+
+@pytest.mark.parametrize(
+    ("value", "kind", "number"),
+    [
+        ("1", "bool", True), ("0", "bool", False), ("1", "int", 1), ("200", "int", 200),
+        ("-2.5", "float", -2.5), ("0", "float", 0.0), ("1e3", "float", 1000.0),
+    ],
+)  # fmt: skip
+def test_a_setting_is_a_number_of_its_fields_kind(value, kind, number):
+    read = read_number(f"x={value}", value, kind)
+    assert read == number and type(read) is type(number)
+
+
+@pytest.mark.parametrize(
+    ("value", "kind", "what"),
+    [
+        ("2", "bool", "neither 0 nor 1"), ("yes", "bool", "neither 0 nor 1"),
+        ("0", "int", "no whole number of 1 or more"), ("1.5", "int", "no whole number"),
+        ("inf", "float", "no finite number"), ("", "float", "no finite number"),
+    ],
+)  # fmt: skip
+def test_what_is_no_number_of_that_kind_is_named(value, kind, what):
+    with pytest.raises(InputError, match=f"--set x={value}: '{value}' is {what}"):
+        read_number(f"x={value}", value, kind)
+
+
+def test_each_method_notes_the_fields_that_it_takes():
+    recipe = Recipe(human_frames=3, robot_frames=4, policy_steps=50, hold=7, K=6)
+    assert {m: set(fields_of(recipe, m)) for m in METHODS} == {
+        "lbw": {
+            "human_frames", "robot_frames", "munit_iterations", "munit_width", "K", "shift", "hue",
+            "transporter_iterations", "policy_steps", "updates", "entropy",
+        },
+        "avid": {
+            "human_frames", "robot_frames", "munit_iterations", "munit_width", "motion", "hold",
+            "classifier_iterations", "random_negatives", "clip", "pixel_updates", "policy_steps",
+            "entropy",
+        },
+        "classifier": {
+            "classifier_iterations", "random_negatives", "clip", "pixel_updates", "hold",
+            "policy_steps", "entropy",
+        },
+        "tracks": {"policy_steps", "updates", "entropy"},
+    }  # fmt: skip
+    assert fields_of(recipe, "classifier")["hold"] == 7 and fields_of(recipe, "lbw")["K"] == 6
+
+
+def test_the_human_videos_are_the_first_of_the_kits_or_the_users_own():
+    def names(**given):
+        args = Namespace(**({"video": None, "videos": None, "method": "lbw"} | given))
+        return [path.name for path in videos("push", args)]
+
+    assert names() == names(method="tracks") == ["expert_01.mp4"]
+    assert names(videos=3) == ["expert_01.mp4", "expert_02.mp4", "expert_03.mp4"]
+    assert names(method="avid")[-1] == "expert_15.mp4" and len(names(method="avid")) == 15
+    assert names(method="avid", videos=1) == ["expert_01.mp4"] and names(method="classifier") == []
+    assert names(video=tasks.ROOT / "my.mp4", videos=3) == ["my.mp4"]
+    with pytest.raises(InputError, match="push has 15 human videos"):
+        names(videos=16)
+
+
+def test_what_is_odd_about_a_video_is_said_and_its_frames_are_taken(tmp_path, monkeypatch, capsys):
+    film, asked = np.zeros((3, 84, 84, 3), np.uint8), []
+    monkeypatch.setattr(
+        job.video, "read", lambda *how: asked.append(how) or (film, ["it is dark.", "it jumps."])
+    )
+    assert job.read_video(tmp_path, whole=True) is film and asked == [(tmp_path, True)]
+    assert capsys.readouterr().err == "warning: it is dark.\nwarning: it jumps.\n"
+
+
+@pytest.mark.parametrize(
+    ("method", "wanted"),
+    [
+        ("lbw", ["sac"]), ("tracks", ["sac"]), ("classifier", ["sac_ae", "classifier of push"]),
+        ("avid", ["sac_ae", "classifier of push", "cyclegan of push"]),
+    ],
+)  # fmt: skip
+def test_a_replay_has_to_have_all_networks_of_its_method(method, wanted, tmp_path, monkeypatch):
+    loaded = []
+    files = {"sac": "policy", "sac_ae": "policy", "classifier": "classifier"}
+    for name in ("sac", "sac_ae", "classifier", "cyclegan"):
+
+        def load(path, task="", name=name):
+            assert path == tmp_path / f"{files.get(name, 'translation')}.safetensors"
+            loaded.append(f"{name} of {task}" if task else name)
+
+        monkeypatch.setattr(job, name, SimpleNamespace(load=load))
+    job.check_weights(tmp_path, "push", method)
+    assert loaded == wanted
+
+
+def test_a_job_notes_what_makes_the_run_again(tmp_path, monkeypatch):
+    """And the frames that it learns from: the first sixteen digits of their sum."""
+    film = np.arange(3 * 84 * 84 * 3, dtype=np.uint8).reshape(3, 84, 84, 3)
+    monkeypatch.setattr(job, "read_video", lambda path, whole=False: film[: 1 + whole])
+    argv = ["--method", "tracks", "--seed", "3", "--jitter", "0.01", "--out", str(tmp_path / "a b")]
+    argv += ["--set", "updates=3", "--set", "entropy=-2", "--threads", "1"]
+    monkeypatch.setattr(job.tracks, "watch", lambda demo: None)
+    made = job.check("push", job.parser("push").read(argv), argv)
+    settings = made.run.metrics["settings"]
+    assert settings == json.loads((tmp_path / "a b" / "settings.json").read_text())
+    recipe = {"policy_steps": 3000, "updates": 3, "entropy": -2.0}
+    assert settings | {"video": ""} == {
+        "task": "push", "seed": 3, "method": "tracks", "reward": "mended", "without": None,
+        "fast": False, "from_scratch": False, "jitter": 0.01, "video": "",
+        "set": ["entropy=-2", "updates=3"], "recipe": recipe,
+    }  # fmt: skip
+    assert len(settings["video"]) == 16 and made.recipe.updates == 3
+    assert made.command.startswith("python -m tasks push --method tracks --seed 3")
+    assert made.command.endswith("--threads 1") and f"'{tmp_path / 'a b'}'" in made.command
+    assert len(made.random) == 0 and made.trained is None and len(made.demo) == 1
+
+
+def test_a_smoke_run_is_of_smoke_sizes_and_what_is_set_comes_before_them(tmp_path, monkeypatch):
+    film = np.zeros((3, 84, 84, 3), np.uint8)
+    monkeypatch.setattr(job, "read_video", lambda path, whole=False: film)
+    monkeypatch.setattr(job.tracks, "watch", lambda demo: None)
+
+    def recipe(*more):
+        argv = ["--fast", "--out", str(tmp_path), *more]
+        return job.check("slide", job.parser("slide").read(argv), argv).recipe
+
+    smoke = recipe()
+    assert (smoke.munit_iterations, smoke.munit_width, smoke.transporter_iterations) == (10, 8, 20)
+    assert (smoke.policy_steps, smoke.robot_frames, smoke.updates) == (800, 200, 4)
+    assert recipe("--set", "policy_steps=900").policy_steps == 900
+    assert recipe("--method", "avid").policy_steps == 530
+    assert recipe("--method", "tracks").policy_steps == 800
