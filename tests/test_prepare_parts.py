@@ -1,0 +1,116 @@
+"""What `prepare` says and in what order it looks, with clips that were never filmed."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from lbw_minimal.clips.detector import Found
+from lbw_minimal.clips.paths import Unusable
+from lbw_minimal.clips.reader import Clip
+from lbw_minimal.training import InputError
+from tasks.commands import prepare
+from tasks.commands.prepare import Choices, Prepared, follow
+
+
+def clip(n=6, height=90, width=160, start=0.0):
+    return Clip(np.zeros((n, height, width, 3), np.uint8), start + np.arange(n) / 20, [], [])
+
+
+def prepared(**more):
+    return Prepared(**({"clip": clip(), "scene": None} | more))
+
+
+@pytest.mark.parametrize(
+    ("warnings", "why_not", "verdict"),
+    [
+        ([], "", "usable"),
+        (["dark"], "", "usable, with a warning"),
+        (["dark", "far"], "", "usable, with 2 warnings"),
+        (["dark"], "no arm is seen.", "not usable: no arm is seen."),
+    ],
+)
+def test_the_verdict_counts_warnings_and_says_why_not(warnings, why_not, verdict):
+    assert prepared(warnings=warnings, why_not=why_not).verdict == verdict
+
+
+def test_a_usable_clip_is_told_with_its_warnings_and_how_to_learn_from_it(
+    tmp_path, monkeypatch, capsys
+):
+    asked = []
+    result = prepared(warnings=["It is dark.", "It is far."])
+    monkeypatch.setattr(prepare, "prepare", lambda *what: asked.append(what) or result)
+    monkeypatch.setattr(prepare, "write", lambda out, *what: asked.append(what) or out / "page")
+    file, out = tmp_path / "my clip.mp4", tmp_path / "out"
+    file.write_bytes(b"")
+    argv = ["push", str(file), "--from", "1", "--tip", "3,4@1.5", "--no-mirror", "--out", str(out)]
+    assert prepare.main(argv) == 0
+    choices = Choices(first=1.0, mirror=False, tip=((3.0, 4.0, 1.5),))
+    command = (
+        f"python -m tasks prepare push '{file}' --from 1 --tip 3,4@1.5 --no-mirror --out {out}"
+    )
+    assert asked == [("push", file, choices), ("push", result, command)]
+    assert capsys.readouterr().out.splitlines() == [
+        "usable, with 2 warnings", f"page: {out / 'page'}", "warning: It is dark.",
+        "warning: It is far.", f"learn: python -m tasks push --video {out / 'reenactment.mp4'}",
+    ]  # fmt: skip
+    result.why_not = "no arm is seen."
+    assert prepare.main(argv) == 2 and "learn:" not in capsys.readouterr().out
+
+
+def test_a_run_on_a_clip_says_what_is_odd_about_it_or_why_it_is_none(tmp_path, monkeypatch, capsys):
+    result = prepared(warnings=["It is dark."])
+    monkeypatch.setattr(prepare, "prepare", lambda name, path: result)
+    assert prepare.usable("push", tmp_path) is result
+    assert capsys.readouterr().err == f"warning: {tmp_path}: It is dark.\n"
+    result.why_not = "no arm is seen."
+    with pytest.raises(InputError, match="no arm is seen"):
+        prepare.usable("push", tmp_path)
+
+
+def test_patches_mend_what_the_shipped_detector_finds_and_corners_refine_it(monkeypatch):
+    frames = np.zeros((2, 84, 84, 3), np.uint8)
+
+    def detector(path):
+        return SimpleNamespace(detect=lambda seen: [path.name, seen is frames])
+
+    monkeypatch.setattr(prepare, "Detector", SimpleNamespace(load=detector))
+    monkeypatch.setattr(prepare, "mended", lambda seen, found, cuts: [*found, cuts, seen is frames])
+    monkeypatch.setattr(prepare, "refine", lambda seen, found: (seen is frames, found))
+    assert prepare.look(frames, [1]) == (True, ["eyes.safetensors", True, [1], True])
+
+
+@pytest.mark.parametrize(
+    ("mark", "inside"),
+    [
+        ((0, 0, 2.0), True), ((160, 90, 2.25), True), ((-1, 5, 2.1), False), ((161, 5, 2.1), False),
+        ((5, 91, 2.1), False), ((5, 5, 1.98), False), ((5, 5, 2.27), False), ((5, 5, 2.255), True),
+    ],
+)  # fmt: skip
+def test_a_mark_lies_in_the_picture_and_in_the_clips_seconds(mark, inside, monkeypatch):
+    """Six frames of 160x90 from 2 s on; the page rounds, so a hundredth of a second is let pass."""
+    nothing = Found(np.zeros((6, 2)), np.zeros((6, 2)), np.zeros(6), np.zeros(6))
+    monkeypatch.setattr(prepare, "look", lambda frames, cuts: nothing)
+    monkeypatch.setattr(prepare.footage, "check", lambda frames, cuts: (frames, []))
+    monkeypatch.setattr(prepare, "lay", lambda tracks, scene, mirror: "laid")
+    for name in ("tip", "object"):
+        result, choices = prepared(clip=clip(start=2.0)), Choices(**{name: (mark,)})
+        if inside:
+            assert follow(result, choices) == "laid"
+        else:
+            with pytest.raises(Unusable, match="is outside of 160x90 pixels and"):
+                follow(result, choices)
+
+
+def test_84_pixels_are_enough_and_83_are_not(monkeypatch):
+    checked = []
+    monkeypatch.setattr(
+        prepare.footage,
+        "check",
+        lambda *what: checked.append(what) or (_ for _ in ()).throw(OSError),
+    )
+    with pytest.raises(OSError):
+        follow(prepared(clip=clip(height=84)), Choices())
+    with pytest.raises(Unusable, match="160x83 pixels are too few"):
+        follow(prepared(clip=clip(height=83)), Choices())
+    assert len(checked) == 1
