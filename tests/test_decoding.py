@@ -3,6 +3,7 @@
 import os
 import time
 from fractions import Fraction
+from pathlib import Path
 from types import SimpleNamespace
 
 import av
@@ -265,6 +266,29 @@ def test_the_outermost_boxes_of_an_mp4_are_found_by_their_sizes(tmp_path):
     assert decoding._boxes(path) == {b"ftyp", b"mdat", b"moov"}
     path.write_bytes(small + small[:4] + b"?" * 12)
     assert decoding._boxes(path) == {b"ftyp"}
+
+
+def test_why_a_film_does_not_open_is_told_from_its_boxes(tmp_path):
+    """An mp4's index is written last: without one it is cut short, with one it is damaged."""
+    path = tmp_path / "a.mp4"
+
+    def box(name):
+        return (16).to_bytes(4, "big") + name + 8 * b"x"
+
+    for boxes, why in (
+        ((b"ftyp", b"mdat"), "cut short, its index is missing"),
+        ((b"ftyp", b"moov"), "the video is damaged"),
+        ((b"moov",), "the video is damaged"),
+        ((b"mdat",), "no video that FFmpeg can read"),
+    ):
+        path.write_bytes(b"".join(map(box, boxes)))
+        assert why in decoding._why_closed(path)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows has its devices elsewhere")
+def test_a_device_is_no_file():
+    with pytest.raises(InputError, match="this is a device"):
+        look(Path("/dev/null"))
 
 
 def test_text_in_either_alphabet_is_text_and_noise_is_none():

@@ -71,6 +71,15 @@ def test_what_goes_on_as_fast_as_before_and_after_is_no_cut():
     assert notes
 
 
+def test_a_change_of_the_picture_is_a_cut_where_the_hand_is_not_seen():
+    """On either side of it: nobody knows where it went meanwhile."""
+    for unseen, is_cut in ((9, True), (10, True), (8, False), (11, False)):
+        sure, notes = np.ones(20), []
+        sure[unseen] = 0.4
+        longest_piece(tracks(np.arange(20.0), sure=sure, cuts=(10,)), False, notes)
+        assert bool(notes) == is_cut
+
+
 def test_enough_frames_have_to_be_sure_and_only_those_count():
     """Half of them of the object, which a hand hides for a while; of the tip 15 %."""
     sure = np.tile([0.6, 0.3], 10)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from toy_pushes import CAMERA, HIT, SCENE, SIDE, at, clip, hit, jerk, push, seen
 
+from lbw_minimal.clips import retarget
 from lbw_minimal.clips.paths import LEAST_FRAMES, Unusable, low_pass, progress
 from lbw_minimal.clips.retarget import APPROACH, FPS, HURRY, Motion, apply, fit, lay, pace
 
@@ -447,3 +448,19 @@ def test_a_scene_is_a_hit_where_the_tip_cannot_get_behind_the_goal():
     assert HIT.hit and not near.hit and not SCENE.hit
     assert replace(near, goal=(HIT.high[0] + HIT.contact + 0.001, 0.02)).hit
     assert not replace(HIT, contact=None).hit
+
+
+def test_a_clip_that_begins_with_the_touch_is_followed_from_its_first_frame():
+    """The hand is out of the tip's box there, and all of its way would have been left out."""
+    t = np.arange(0, 2.6, 1 / 30)
+    tip, thing = push(1.3 + t)  # 3 % of the way is gone, and 12 % within a tenth of a second
+    motion = lay(seen((tip, thing), t), SCENE)
+    before = round(APPROACH * FPS)
+    assert motion.contact < before + 0.15 * FPS and motion.times[before] < 0.15
+
+
+@pytest.mark.parametrize(("i", "first"), [(0, 0), (3, 3), (10, 7)])
+def test_what_is_out_of_reach_is_left_out_up_to_the_touch(i, first):
+    """Ten steps, of which the first seven are 3 cm above the box; the hand moves all along."""
+    x = np.stack([0.45 + 0.01 * np.arange(11), np.where(np.arange(11) < 7, 0.20, 0.10)], 1)
+    assert retarget._first_step(x, i, SCENE) == first

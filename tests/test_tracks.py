@@ -90,6 +90,19 @@ def test_the_objects_pixels_and_the_side_it_is_pushed_from_are_found():
     np.testing.assert_allclose(shown.corner + shown.behind, (30, 44.5), atol=1)  # its left side
 
 
+def test_an_object_of_the_backgrounds_colour_is_as_large_as_flow_looks_about_its_points():
+    """Nothing seems to have left, as where a hand covers it at the end."""
+    frame = np.full((84, 84, 3), 90, np.uint8)
+    mask = tracks.silhouette(frame, frame, np.array([20.0, 0]), np.array([[30.0, 40], [31.6, 40]]))
+    y, x = np.nonzero(mask)
+    assert (x.min(), x.max(), y.min(), y.max()) == (28, 34, 38, 42)
+    # and so where what left has none of the points
+    left = frame.copy()
+    left[10:16, 50:56], frame[10:16, 30:36] = 200, 200
+    elsewhere = tracks.silhouette(frame, left, np.array([20.0, 0]), np.array([[30.0, 60]]))
+    assert elsewhere.sum() == 25 and elsewhere[60, 30]
+
+
 def test_a_background_is_seen_through_what_stands_before_it_for_most_of_a_film():
     """For 65 of 100 frames an arm covers the wall, with many colours; the median shows the arm."""
     rng = np.random.default_rng(0)

@@ -171,10 +171,13 @@ def test_reading_twice_gives_identical_frames(tmp_path):
     )
 
 
-def test_central_square_of_a_wide_video_is_kept(tmp_path):
-    wide = np.zeros((30, 84, 200, 3), np.uint8)
-    wide[:, :, 58:142] = film()
-    encode(tmp_path / "mine.mp4", wide)
+@pytest.mark.parametrize(("height", "width"), [(84, 200), (200, 84)])
+def test_central_square_is_kept(height, width, tmp_path):
+    """What is beside it is no border: those are black, and cut off before."""
+    large = np.full((30, height, width, 3), 90, np.uint8)
+    top, left = (height - 84) // 2, (width - 84) // 2
+    large[:, top : top + 84, left : left + 84] = film()
+    encode(tmp_path / "mine.mp4", large)
     back, _ = video.read(tmp_path / "mine.mp4")
     assert np.abs(back.astype(float) - film()).mean() < 10
 
