@@ -19,12 +19,12 @@ def test_an_arm_stands_out_by_more_than_eight_grey_levels_in_some_colour(levels,
 def test_the_arms_pixels_count_by_their_nearness_and_by_how_clearly_they_stand_out():
     """Two columns at the picture's edge, 1.5 pixels apart in their distance: 1 to 1 / e."""
     frame = WALL.copy()
-    frame[0, 40:42] += 40
+    frame[0, 40], frame[0, 41] = 180, 140  # 40 levels are as clear as can be
     place = np.array([38.0, 0])  # 2 and 3 pixels off
     share = np.exp(-1 / 1.5)
     x, y = tracks.arm_near(frame, WALL, NOTHING, place)
     assert (x, y) == pytest.approx(((40 + 41 * share) / (1 + share), 0))
-    frame[0, 40] = 120  # half as clear as 40 levels, which is as clear as can be
+    frame[0, 40] = 120  # half as clear
     x, _ = tracks.arm_near(frame, WALL, NOTHING, place)
     assert x == pytest.approx((40 * 0.5 + 41 * share) / (0.5 + share))
 
