@@ -68,3 +68,45 @@ def test_motion_weights_can_be_switched_off_in_each_translation(translation, mon
     critics = {domain: lambda v: [v] for domain in "xy"}
     L = translation.discriminator_losses(critics, real, real, *made, median_x=0 * real)
     assert L["L_D^x"].item() == pytest.approx(1 / 4)  # with the weights (1 + 20) / (4 + 20)
+
+
+@pytest.mark.parametrize("translation", [munit, cyclegan])
+def test_a_row_of_the_log_has_the_means_of_the_steps_since_the_row_before(translation, monkeypatch):
+    """Losses 1, 2, 3, 4, a row every two steps, and the translations of the averaged weights."""
+    losses, asked = iter([1.0, 2.0, 3.0, 4.0]), []
+    frames = [np.full((2, 84, 84, 3), level, np.uint8) for level in (10, 20)]
+
+    def mean_images(model, human, robot):
+        asked.append((model, human[0, 0, 0, 0], robot[0, 0, 0, 0]))
+        return {name: np.zeros(1) for name in ("x", "y", "x_of_y", "y_of_x")}
+
+    monkeypatch.setattr(translation, "LOG_EVERY", 2)
+    monkeypatch.setattr(translation, "_update", lambda *_: {"L_cyc^y": next(losses)})
+    monkeypatch.setattr(translation, "mean_images", mean_images)
+    average, log = translation.train(*frames, iterations=4, seed=0, width=2)
+    assert [(row["step"], row["L_cyc^y"]) for row in log] == [(2, 1.5), (4, 3.5)]
+    assert asked == 2 * [(average, 10, 20)] and log[0]["mean_image^x"] == 0
+
+
+def test_cyclegans_mean_images_are_named_by_what_they_are_made_of(monkeypatch):
+    """G adds 1 to human frames, F takes 1 from the robot's; 32 frames stand for all."""
+    seen = []
+
+    def repaint(frames, network, device):
+        seen.append(len(frames))
+        return frames + np.uint8(1) if network == "G" else frames - np.uint8(1)
+
+    class Model:
+        y_of_x, x_of_y = "G", "F"
+
+        def parameters(self):
+            yield torch.zeros(1)
+
+    monkeypatch.setattr(gan, "repaint", repaint)
+    human = np.repeat(np.array([10, 30], np.uint8), 84 * 84 * 3 * 50).reshape(100, 84, 84, 3)
+    robot = np.full((5, 84, 84, 3), 90, np.uint8)
+    mean = cyclegan.mean_images(Model(), human, robot)
+    assert {name: image.mean() for name, image in mean.items()} == {
+        "x": 20, "x_of_y": 89, "y": 90, "y_of_x": 21,
+    }  # fmt: skip
+    assert sorted(seen) == [5, 32] and mean["x"].shape == (84, 84, 3)
