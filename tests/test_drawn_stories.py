@@ -78,7 +78,7 @@ def test_who_pushes_or_carries_stays_where_it_touches(kind):
     for seed in SEEDS:
         told = story(kind, seed)
         beside = (told.tip - told.object)[under_way(told)]
-        assert np.ptp(beside, axis=0).max() < 1e-6
+        assert np.ptp(beside, axis=0).max() < 1e-6 and np.abs(beside).max() > 0.1
 
 
 def test_who_pushes_or_hits_is_behind_the_object_when_it_goes():
@@ -97,7 +97,7 @@ def test_a_hit_object_goes_on_ever_slower_and_the_hand_four_pixels_at_most():
         told = story("hit", seed)
         steps = np.linalg.norm(np.diff(told.object, axis=0), axis=1)
         moving = steps[steps > 1e-9]
-        assert (np.diff(moving[1:]) < 1e-9).all()  # the first may have begun between frames
+        assert (np.diff(moving[1:]) < -1e-9).all()  # the first may have begun between frames
         hand.append(np.linalg.norm(told.tip[-2] - told.tip[under_way(told)[0]]))
     assert np.median(hand) < 4  # three in five stay there to the end
 
@@ -111,6 +111,8 @@ def test_a_hand_comes_from_elsewhere_and_what_it_leans_on_comes_along():
         told = story("push", seed)
         shoulder = told.shoulder[under_way(told)[0]]
         outside += ((shoulder < 8) | (shoulder > SIZE)).any()
+        comes, leans = (p[under_way(told)[0]] - p[0] for p in (told.tip, told.shoulder))
+        assert 0 <= leans @ comes <= 1.001 * comes @ comes  # by a part of the hand's way, or all
     assert outside > 36
 
 
@@ -127,6 +129,6 @@ def test_a_shadow_is_where_the_arm_is_moved_by_its_fall():
     layer[20:40, 20:40] = 255
     lit = drawings._lit(layer, 0.4, np.array([10.0, 5.0]), 0.5)
     assert lit.shape == (SIZE, SIZE, 1)
-    assert lit[35, 40, 0] == pytest.approx(0.6, abs=1e-3)
-    assert lit[22, 25, 0] == 1 and lit[70, 70, 0] == 1
+    assert lit[30, 47, 0] == pytest.approx(0.6, abs=1e-3)
+    assert lit[47, 30, 0] == 1 and lit[22, 25, 0] == 1 and lit[70, 70, 0] == 1
     assert drawings._lit(layer, 0.0, np.zeros(2), 1.0) == 1
