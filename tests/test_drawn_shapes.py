@@ -124,6 +124,14 @@ def test_a_surface_is_even_where_it_has_no_strength_and_about_1_elsewhere():
     assert 0.03 < many.std(axis=(1, 2)).mean() < 0.12
 
 
+def test_a_hand_reaches_from_its_wrist_to_its_tip_and_no_farther():
+    """In lengths of the hand: u from -1 to 0, to either side by half of it at most."""
+    for u_a, v_a, u_b, v_b, r_a, r_b in (np.array(hand).T for hand in draw.HANDS.values()):
+        u, v, r = (np.concatenate(ends) for ends in ((u_a, u_b), (v_a, v_b), (r_a, r_b)))
+        assert u.min() >= -1 and -0.05 <= (u + r).max() <= 0
+        assert np.abs(v).max() < 0.5 and r.min() >= 0.05 and (u_a < u_b).all()
+
+
 def person(**of):
     """A person whose arm has what a test says of it, and nothing else that is left to chance."""
     someone = draw.Person(np.random.default_rng(0), reach=50)

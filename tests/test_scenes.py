@@ -14,6 +14,7 @@ from test_viewer import commands
 
 import tasks
 from tasks.world import World, expert_actions, random_actions
+from tasks.world.scene import numbers
 from tasks.world.viewer import mirror, transform
 
 PORTRAITS = Path(__file__).parent / "robots.png"
@@ -108,6 +109,16 @@ def test_the_robot_and_its_scene_look_as_they_did_to_the_shipped_weights(name):
     column = 84 * tasks.TASKS.index(name)
     known = np.asarray(Image.open(PORTRAITS))[:, column : column + 84].astype(int)
     assert (np.abs(portrait(name) - known) > 3).mean() < 1e-3
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.float32])
+def test_a_picture_in_tuples_has_the_numbers_of_one_in_arrays(kind):
+    """As PyBullet gives it that was built without NumPy: bytes, or floats as C rounds them."""
+    picture = np.array([0, 1, 200, 255] if kind is np.uint8 else [0.0, 0.1, 0.999, 1.0], kind)
+    for given in (picture, tuple(picture.tolist())):
+        found = numbers(given, kind)
+        assert found.dtype == kind
+        np.testing.assert_array_equal(found, picture)
 
 
 if __name__ == "__main__":
