@@ -8,11 +8,12 @@ it, in whatever file they are, and a function's head by those of its body.
 from __future__ import annotations
 
 import ast
+import hashlib
 import json
 import re
 from bisect import bisect
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 ROOT = Path(__file__).parent.parent
@@ -27,10 +28,9 @@ BUDGET = 10.0  # s of processor time that the tests of one fault may take, by wh
 
 def asked() -> list[str]:
     """The test files that use the kit's code themselves."""
-    files = sorted((ROOT / "tests").glob("test_*.py"))
     return [
         f"tests/{path.name}"
-        for path in files
+        for path in sorted((ROOT / "tests").glob("test_*.py"))
         if path.name not in NOT_ASKED and USES_KIT.search(path.read_text())
     ]
 
@@ -38,22 +38,35 @@ def asked() -> list[str]:
 def measure(run: Callable[..., dict], out: Path) -> dict:
     """{"lines": {file: {test: [line, ...]}}, "seconds": {test: s}} of all tests, kept in a file.
 
-    A test that fails without a fault is left out. `run` asks `tests.warm`.
+    What is kept holds for as long as the kit and the test file stay as they are. A test that fails
+    without a fault is left out. `run` asks `tests.warm`.
     """
-    known = json.loads(out.read_text()) if out.exists() else {"lines": {}, "seconds": {}, "of": []}
+    known = json.loads(out.read_text()) if out.exists() else {"lines": {}, "seconds": {}, "of": {}}
+    kit = "".join(path.read_text() for folder in KIT for path in sorted(files(folder)))
+    digests = {tests: _digest(kit + (ROOT / tests).read_text()) for tests in asked()}
     out.parent.mkdir(exist_ok=True)
-    for tests in (file for file in asked() if file not in known["of"]):
+    for tests in (t for t, digest in digests.items() if known["of"].get(t) != digest):
+        for by_test in (known["seconds"], *known["lines"].values()):
+            for test in [test for test in by_test if file_of(test) == tests]:
+                del by_test[test]
         answer = run(tests=[tests], cover=True)
+        sound = answer["seconds"].keys() - set(answer["failed"])
         for file, by_test in answer["lines"].items():
             rows = known["lines"].setdefault(str(Path(file).relative_to(answer["root"])), {})
-            rows |= {t: lines for t, lines in by_test.items() if t not in answer["failed"]}
-        known["seconds"] |= {
-            t: s for t, s in answer["seconds"].items() if t not in answer["failed"]
-        }
-        known["of"].append(tests)
+            rows |= {test: lines for test, lines in by_test.items() if test in sound}
+        known["seconds"] |= {test: answer["seconds"][test] for test in sound}
+        known["of"][tests] = digests[tests]
         out.write_text(json.dumps(known))
         print(f"{tests}: {len(answer['seconds'])} tests, {len(answer['failed'])} fail", flush=True)
     return known
+
+
+def files(folder: str) -> Iterable[Path]:
+    return (ROOT / folder).rglob("*.py")
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def file_of(test: str) -> str:
@@ -73,7 +86,7 @@ class Lines:
         self.code = {
             str(path.relative_to(ROOT)): path.read_text().splitlines()
             for folder in KIT
-            for path in (ROOT / folder).rglob("*.py")
+            for path in files(folder)
         }
 
     def tests(self, file: str, line: int) -> list[str]:
@@ -86,8 +99,8 @@ class Lines:
         running = self.running(file, line)
         own = f"tests/test_{Path(file).stem}.py"
         count = Counter(file_of(test) for test in running)
-        files = sorted(count, key=lambda name: (name != own, -count[name]))[:MOST_FILES]
-        some = {t for t in self.seconds if file_of(t) in files}
+        most = sorted(count, key=lambda name: (name != own, -count[name]))[:MOST_FILES]
+        some = {t for t in self.seconds if file_of(t) in most}
 
         def rank(test: str) -> tuple:
             seconds = self.seconds[test]
@@ -116,7 +129,7 @@ class Lines:
             return self.of_lines(place for place in self.by_line if place[0] == file)
         return tests
 
-    def of_lines(self, places: Iterator[tuple[str, int]]) -> set[str]:
+    def of_lines(self, places: Iterable[tuple[str, int]]) -> set[str]:
         return set().union(*(self.by_line.get(place, ()) for place in places))
 
 
