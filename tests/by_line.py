@@ -146,13 +146,12 @@ def statement(tree: ast.Module, line: int) -> tuple[int, int, list[str], bool]:
     last = node.end_lineno
     if hasattr(node, "body") and not isinstance(node, ast.FunctionDef | ast.ClassDef):
         last = max(node.lineno, node.body[0].lineno - 1)
-    targets = getattr(node, "targets", [getattr(node, "target", node)])
-    names = [
-        part.id if isinstance(part, ast.Name) else part.name
-        for target in targets
-        for part in ([target] if hasattr(target, "name") else ast.walk(target))
-        if isinstance(part, ast.Name) or hasattr(part, "name")
-    ]
+    if isinstance(node, ast.FunctionDef | ast.ClassDef):
+        names = [node.name]
+    else:
+        targets = getattr(node, "targets", [getattr(node, "target", None)])
+        inside = [part for target in filter(None, targets) for part in ast.walk(target)]
+        names = [part.id for part in inside if isinstance(part, ast.Name)]
     at_import = not any(isinstance(n, ast.FunctionDef) for n in around)
     return node.lineno, last, names, at_import
 
