@@ -110,3 +110,39 @@ def test_cyclegans_mean_images_are_named_by_what_they_are_made_of(monkeypatch):
         "x": 20, "x_of_y": 89, "y": 90, "y_of_x": 21,
     }  # fmt: skip
     assert sorted(seen) == [5, 32] and mean["x"].shape == (84, 84, 3)
+
+
+@pytest.mark.parametrize("translation", [munit, cyclegan])
+def test_each_loss_is_weighted_by_its_own_image_and_its_domains_median(translation, monkeypatch):
+    """x, y, x_of_y, y_of_x are 1, 2, 3, 4 grey; the medians 10 and 20: 10.3 is x_of_y with X's."""
+    asked = {}
+
+    def weight(image, median, gain):
+        found = median.mean().item() + image.mean().item() / 10
+        asked[round(found, 1)] = gain
+        return torch.tensor(found)
+
+    monkeypatch.setattr(translation, "motion_weight", weight)
+    monkeypatch.setattr(translation, "l1", lambda a, b, weight=0.0: weight)
+    monkeypatch.setattr(translation, "least_squares", lambda scores, target, weight: weight)
+    monkeypatch.setattr(gan, "critic_loss", lambda D, real, made, w_real, w_made: (w_real, w_made))
+    x, y, x_of_y, y_of_x = (torch.full((1, 3, 2, 2), float(n)) for n in (1, 2, 3, 4))
+    medians = torch.full((1, 3, 2, 2), 10.0), torch.full((1, 3, 2, 2), 20.0)
+
+    class Model:
+        """Networks that return what they are given."""
+
+        content = style = decode = staticmethod(lambda image, *_: image)
+        x_of_y = y_of_x = staticmethod(lambda image: image)
+
+    critics = {domain: lambda image: [image] for domain in "xy"}
+    made = (x_of_y, y_of_x) if translation is cyclegan else ((x, y, x, y, x_of_y, y_of_x),)
+    L = translation.generator_losses(Model(), critics, x, y, *made, *medians)
+    named = {"L_GAN^x": 10.3, "L_GAN^y": 20.4, "L_cyc^x": 10.1, "L_cyc^y": 20.2}
+    named |= {"L_rec^x": 10.1, "L_rec^y": 20.2} if translation is munit else {}
+    assert {name: float(w) for name, w in L.items() if w} == pytest.approx(named)
+    assert asked == {10.1: 4, 20.2: 4, 10.3: 20, 20.4: 20}
+    L = translation.discriminator_losses(critics, x, y, *made, *medians)
+    for name, weights in {"L_D^x": (10.1, 10.3), "L_D^y": (20.2, 20.4)}.items():
+        assert [w.item() for w in L[name]] == pytest.approx(weights)
+    assert asked == {10.1: 20, 20.2: 20, 10.3: 20, 20.4: 20}
