@@ -51,7 +51,7 @@ COMES = [-60, -40, -20, -10, -6, -2, 2, 6, 10, 10]
     ("x", "tip", "is_it"),
     [
         (WAITS, COMES, True),
-        (np.multiply(WAITS, 0.35), COMES, False),  # 7 % of the side
+        (np.multiply(WAITS, 0.25), COMES, False),  # 5 % of the side
         (np.multiply(WAITS, 0.45), COMES, True),  # 9 %
         (np.add(WAITS, 35), COMES, False),  # the hand is 45 % of the side away when it starts
         (np.add(WAITS, 25), COMES, True),
