@@ -89,17 +89,18 @@ class Lines:
             for path in files(folder)
         }
 
-    def tests(self, file: str, line: int) -> list[str]:
+    def tests(self, file: str, line: int, every: bool = False) -> list[str]:
         """The tests that can notice a fault in a line, the likeliest and cheapest first.
 
         They are of a few files: the line's own, and those with most tests that run it. Behind these
         tests come the others of their files, which may share what it made. What goes beyond the
-        budget is left out.
+        budget is left out; every: nothing is.
         """
         running = self.running(file, line)
         own = f"tests/test_{Path(file).stem}.py"
         count = Counter(file_of(test) for test in running)
-        most = sorted(count, key=lambda name: (name != own, -count[name]))[:MOST_FILES]
+        most = sorted(count, key=lambda name: (name != own, -count[name]))
+        most = most if every else most[:MOST_FILES]
         some = {t for t in self.seconds if file_of(t) in most}
 
         def rank(test: str) -> tuple:
@@ -109,7 +110,7 @@ class Lines:
         chosen, spent = [], 0.0
         for test in sorted(some, key=rank):
             spent += self.seconds[test]
-            if spent < BUDGET or not chosen:
+            if every or spent < BUDGET or not chosen:
                 chosen.append(test)
         return chosen
 

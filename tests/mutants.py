@@ -7,7 +7,8 @@ with many operators does not count more. Each mutant lives in a copy of the tree
 that run its line (`tests.by_line`), in a process that has torch already (`tests.warm`): the brief
 ones first, up to the first that fails, and ten seconds' worth of them. What others would notice
 is not counted: the score is a lower bound. A smaller `--count` takes the first of the same sample.
-Results that are there are gone on with, and so are the lines that tests run, in `runs/`.
+Results that are there are gone on with, and so are the lines that tests run, in `runs/`. What
+passed meets every test of its line, and those written since, by `--again`.
 """
 
 from __future__ import annotations
@@ -248,8 +249,8 @@ class Tree:
         self.warm.stdin.flush()
         return json.loads(self.warm.stdout.readline())
 
-    def meet(self, mutant: Mutant, lines: Lines) -> dict:
-        """Put the fault in, run the tests, take it out: a row of the results."""
+    def meet(self, mutant: Mutant, lines: Lines, every: bool) -> dict:
+        """Put the fault in, run the tests, or every one, take it out: a row of the results."""
         path = self.folder / mutant.file
         source = path.read_text()
         changed = mutate_code(source, _operators()[mutant.operator], mutant.occurrence)
@@ -257,7 +258,7 @@ class Tree:
         line = next(
             (i for i, pair in enumerate(zip(before, after, strict=False)) if pair[0] != pair[1]), 0
         )
-        tests = lines.tests(mutant.file, mutant.line)
+        tests = lines.tests(mutant.file, mutant.line, every)
         while True:
             self.write(path, changed)
             try:
@@ -291,17 +292,27 @@ class Tree:
         return test not in self.unsound
 
 
+def _mutant_of(row: dict) -> Mutant:
+    return Mutant(*(row[field] for field in Mutant._fields))
+
+
 def main() -> None:
     """Meet the mutants that have no result yet, and print the score."""
     parser = argparse.ArgumentParser(prog="python -m tests.mutants", description=__doc__)
     parser.add_argument("--count", type=int, default=500, help="mutants in all")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--jobs", type=int, default=2, help="copies of the tree, one process each")
+    parser.add_argument(
+        "--again", action="store_true", help="meet what passed again, with every test of its line"
+    )
     parser.add_argument("--out", type=Path, default=RESULTS, help="results, which are gone on with")
     args = parser.parse_args()
     wanted = draw(args.count, args.seed)
     rows = json.loads(args.out.read_text()) if args.out.exists() else []
-    done = {Mutant(*(row[field] for field in Mutant._fields)) for row in rows}
+    if args.again:
+        wanted = [_mutant_of(row) for row in rows]
+        rows = [row for row in rows if row["noticed"]]
+    done = set(map(_mutant_of, rows))
     with tempfile.TemporaryDirectory(prefix="mutants_") as folder:
         trees: Queue[Tree] = Queue()
         for i in range(args.jobs):
@@ -311,7 +322,7 @@ def main() -> None:
         def meet(mutant: Mutant) -> None:
             tree = trees.get()
             try:
-                row = tree.meet(mutant, lines)
+                row = tree.meet(mutant, lines, args.again)
             finally:
                 trees.put(tree)
             rows.append(row)

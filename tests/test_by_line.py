@@ -86,6 +86,7 @@ def test_what_goes_beyond_the_budget_is_left_out_and_so_are_further_files(lines,
     assert "tests/test_b.py::long" not in lines.tests("kit/far.py", 8)
     monkeypatch.setattr(by_line, "MOST_FILES", 1)
     assert lines.tests("kit/far.py", 8) == ["tests/test_far.py::own"]
+    assert len(lines.tests("kit/far.py", 8, every=True)) == 5
 
 
 def test_lines_are_measured_once_and_again_where_a_test_file_has_changed(tmp_path, monkeypatch):
