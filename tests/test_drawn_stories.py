@@ -47,6 +47,29 @@ def test_the_move_begins_when_the_hand_is_there_and_the_hand_leaves_when_it_is_o
     assert 0.1 < touched < 0.5 and stayed == 0
 
 
+class Longest:
+    """Chance that lets all last as long as it may, and does without what is seldom."""
+
+    def uniform(self, low, high, size):
+        return np.full(size, high)
+
+    def random(self):
+        return 0.99
+
+
+def test_rests_and_moves_last_as_long_as_in_real_clips_at_most():
+    """Rest 0.25 s, approach 0.9, rest 0.25, move 1.7, rest 0.4, retreat 0.8, rest 0.3: 4.6 in all.
+
+    A tenth of a second of approach and retreat, and three of the move, are the least.
+    """
+    seconds = np.array([0.25, 0.7, 1.15, 1.4, 2.25, 3.1, 3.5, 3.9, 4.3])[:, None]
+    begin, approach, move, retreat = drawings._phases(Longest(), seconds / 4.6)
+    assert begin == pytest.approx(1.4 / 4.6)
+    np.testing.assert_allclose(approach[:3, 0], [0, 0.5, 1], atol=1e-9)
+    np.testing.assert_allclose(move[3:6, 0], [0, 0.5, 1], atol=1e-9)
+    np.testing.assert_allclose(retreat[6:, 0], [0, 0.5, 1], atol=1e-9)
+
+
 @pytest.mark.parametrize("kind", ["push", "hit", "alone"])
 def test_an_object_goes_straight_and_never_back_from_and_to_a_place_in_the_picture(kind):
     for seed in SEEDS:
