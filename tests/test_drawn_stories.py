@@ -155,3 +155,23 @@ def test_a_shadow_is_where_the_arm_is_moved_by_its_fall():
     assert lit[30, 47, 0] == pytest.approx(0.6, abs=1e-3)
     assert lit[47, 30, 0] == 1 and lit[22, 25, 0] == 1 and lit[70, 70, 0] == 1
     assert drawings._lit(layer, 0.0, np.zeros(2), 1.0) == 1
+
+
+def test_walls_and_most_tables_have_clutter_and_the_ground_is_what_the_object_stands_before(
+    monkeypatch,
+):
+    asked, counts = [], []
+    monkeypatch.setattr(
+        drawings, "_clutter", lambda rng, layer, n, low, high: asked.append((n, low, high))
+    )
+    for seed in SEEDS:
+        told, before = story("push", seed), len(asked)
+        picture, ground = drawings._room(np.random.default_rng(seed), told)
+        x, y = told.object[0].clip(0, SIZE - 1).astype(int)
+        np.testing.assert_array_equal(ground, picture[y, x])
+        (n, low, high), *table = asked[before:]
+        assert low == (0, 0) and high == (SIZE, 50) and n >= 0
+        assert all(high == (SIZE, SIZE) and low[0] == 0 for _, low, high in table)
+        counts.append(len(table))
+    assert 28 <= sum(counts) <= 39  # 85 % of 40
+    assert {n for n, *_ in asked} >= {0, 1, 3}
