@@ -22,7 +22,7 @@ USES_KIT = re.compile(r"^ *(from|import) (lbw_minimal|tasks)\b", re.M)
 # The house's rules are of the text, and three others need what is not there.
 NOT_ASKED = {"test_house.py", "test_builds.py", "test_cluster.py", "test_systems.py"}
 BANDS = (0.2, 1.0, 5.0)  # s: brief tests first
-MOST_FILES = 8
+MOST_FILES = 12
 BUDGET = 10.0  # s of processor time that the tests of one fault may take, by what they took before
 
 
@@ -92,14 +92,14 @@ class Lines:
     def tests(self, file: str, line: int, every: bool = False) -> list[str]:
         """The tests that can notice a fault in a line, the likeliest and cheapest first.
 
-        They are of a few files: the line's own, and those with most tests that run it. Behind these
+        They are of a few files: the line's own, and those of whose tests most run it. Behind these
         tests come the others of their files, which may share what it made. What goes beyond the
         budget is left out; every: nothing is.
         """
         running = self.running(file, line)
         own = f"tests/test_{Path(file).stem}.py"
-        count = Counter(file_of(test) for test in running)
-        most = sorted(count, key=lambda name: (name != own, -count[name]))
+        count, whole = (Counter(map(file_of, tests)) for tests in (running, self.seconds))
+        most = sorted(count, key=lambda name: (name != own, -count[name] / whole[name]))
         most = most if every else most[:MOST_FILES]
         some = {t for t in self.seconds if file_of(t) in most}
 

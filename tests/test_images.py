@@ -3,7 +3,7 @@
 import numpy as np
 import torch
 
-from lbw_minimal.images import median_frame, motion_weight, to_frames, to_images
+from lbw_minimal.images import median_frame, motion_weight, spread, to_frames, to_images
 
 
 def test_frames_survive_the_way_to_images_and_back():
@@ -20,6 +20,12 @@ def test_black_is_minus_one_and_white_is_one():
 def test_images_beyond_the_range_become_black_and_white():
     images = torch.tensor([-1.5, 1.5]).view(2, 1, 1, 1).expand(2, 3, 1, 1)
     assert to_frames(images)[:, 0, 0, 0].tolist() == [0, 255]
+
+
+def test_some_frames_are_spread_from_the_first_to_the_last():
+    assert spread(np.arange(9), 3).tolist() == [0, 4, 8]
+    assert spread(np.arange(10), 4).tolist() == [0, 3, 6, 9]
+    assert spread(np.arange(3), 60).tolist() == [0, 1, 2]
 
 
 def test_median_is_each_pixels_own():
