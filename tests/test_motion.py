@@ -114,3 +114,16 @@ def test_a_jump_is_three_times_what_is_usual_nearby_and_more_where_frames_are_fa
     monkeypatch.setattr(motion, "_unexplained", lambda frames, size: (rest, rest))
     frames = np.zeros((41, 84, 84, 3), np.uint8)
     assert jumps(frames, np.arange(41) / rate) == ([21] if jumped else [])
+
+
+def test_what_noise_does_everywhere_is_no_motion(monkeypatch):
+    """Five grey levels more in every frame: the tenth part that changes least says how much."""
+    rest = np.zeros(40)
+    rest[[17, 18, 22, 23]], rest[20] = 1.0, 3.4
+    frames = np.zeros((41, 84, 84, 3), np.uint8)
+    for noise in (0, 5):
+        monkeypatch.setattr(motion, "_unexplained", lambda *_, n=noise: (rest + n, rest + n))
+        assert jumps(frames, np.arange(41) / 25) == [21]
+    monkeypatch.setattr(motion, "_unexplained", lambda *_: (0 * rest + 5, 0 * rest + 5))
+    late = np.arange(41) / 25 + 2 * (np.arange(41) > 30)  # a pause in which nothing changed
+    assert jumps(frames, late) == []
