@@ -61,8 +61,8 @@ def test_a_stick_is_as_thick_at_either_end_as_that_ends_radius():
 
 @pytest.mark.parametrize("kind", ["box", "can", "flat", "ball", "front"])
 def test_a_thing_stands_about_its_middle_in_its_size(kind):
-    sides = np.array(extent(drawn(kind)[..., 3]))
-    assert np.abs(sides - (30, 50, 44, 56)).max() <= 1
+    sides = np.array(extent(drawn(kind, half=(16, 24), at=(40, 42))[..., 3]))
+    assert np.abs(sides - (24, 56, 18, 66)).max() <= 1
 
 
 def test_a_mugs_handle_is_a_ring_on_its_right():
