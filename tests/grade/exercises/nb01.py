@@ -240,7 +240,14 @@ nullspace.mistake(
         episodes = []
         for seed in (seed, None) if ask == "two episodes" else (seed,):
             start, info = env.reset(seed=seed)
-            rows = [env.step(action) for action in actions]
+            seen, rows = np.copy(start), []
+            for action in actions:
+                rows.append(env.step(action))
+                if not np.array_equal(seen, start):
+                    raise ValueError(
+                        "an observation changes after it was returned, by later steps: return a new "
+                        "array each time, np.array([x], np.float32)"
+                    )
             obs, reward, terminated, truncated, infos = zip(*rows)
             episodes.append({
                 "start": start, "obs": np.stack(obs), "reward": np.array(reward, float),
@@ -276,9 +283,9 @@ def _walk(rng, most=1, steps=20, ask="episode"):
 
 
 def _far(rng):
-    """Fifty steps and one, mostly in one direction, so that it leaves [-1, 1]."""
-    actions, seed, ask = _walk(rng, 1, 51, "two episodes")
-    return rng.choice([-1, 1]) * np.where(rng.random((51, 1)) < 0.9, 1, actions), seed, ask
+    """More than fifty steps, mostly in one direction, so that it leaves [-4, 4]."""
+    actions, seed, ask = _walk(rng, 1, 140, "two episodes")
+    return rng.choice([-1, 1]) * np.where(rng.random((140, 1)) < 0.9, 1, actions), seed, ask
 
 
 def _home(rng):
@@ -341,6 +348,11 @@ Point.mistake(
     "The action is clipped; the position is free.",
     "self.t += 1",
     "self.x = float(np.clip(self.x, -1, 1))\n        self.t += 1",
+)
+Point.mistake(
+    "The action is clipped; the position is free, and may leave observation_space.",
+    "self.t += 1",
+    "self.x = float(np.clip(self.x, -4, 4))\n        self.t += 1",
 )
 Point.mistake(
     "reset returns two things: the observation, and {} for what else there is to know.",

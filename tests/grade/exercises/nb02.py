@@ -45,8 +45,13 @@ def squash(mean, log_std, noise):
 
 
 def _moderate(rng):
+    """Means, log-deviations, of which the first row's are very low, and noise."""
     shape = rng.integers((4, 1), (10, 6))
-    return (_uniform(rng, low, high, *shape) for low, high in ((-1, 1), (-2, -0.5), (-1, 1)))
+    mean, log_std, noise = (
+        _uniform(rng, low, high, *shape) for low, high in ((-1, 1), (-2, -0.5), (-1, 1))
+    )
+    log_std[0] -= 4.8
+    return mean, log_std, noise
 
 
 def _one_action(rng):
@@ -73,7 +78,9 @@ def _adds_up_to_one(got, args):
 def _far_out(rng):
     shape = rng.integers((5, 2), (9, 5))
     side = torch.from_numpy(rng.choice([-1, 1], shape).astype(np.float32))
-    return side * _uniform(rng, 10, 25, *shape), _uniform(rng, -2, 0, *shape), _normal(rng, *shape)
+    log_std = _uniform(rng, -2, 0, *shape)
+    log_std[0] += 4.5
+    return side * _uniform(rng, 10, 25, *shape), log_std, _normal(rng, *shape)
 
 
 squash.check(
@@ -175,6 +182,21 @@ squash.mistake(
     "0.5 * u**2",
 )
 squash.mistake(
+    "log_std is taken as it is, however high or low; whoever makes it may cut it off.",
+    "u = mean",
+    "log_std = log_std.clamp(-5, 2)\n    u = mean",
+)
+squash.mistake(
+    "log_std is taken as it is, however high or low; whoever makes it may cut it off.",
+    "u = mean",
+    "log_std = log_std.clamp(-20, 2)\n    u = mean",
+)
+squash.mistake(
+    "The numbers of one action, the last dimension, are added up; you add up over the batch.",
+    ".sum(-1)",
+    ".sum(0)",
+)
+squash.mistake(
     "Where u is cut off, the density is that of another action. The form with softplus bears "
     "any u.",
     "u = mean + log_std.exp() * noise",
@@ -247,6 +269,12 @@ critic_target.mistake(
     "You do not look at terminal: after the end there is neither value nor entropy.",
     "(1 - terminal)",
     "1",
+)
+critic_target.mistake(
+    "The next action's entropy lies in the future too: after the end there is none, so the bracket "
+    "around Q and entropy is inside what (1 - terminal) cuts off.",
+    "(1 - terminal) * value",
+    "((1 - terminal) * torch.minimum(q1, q2) - alpha * log_pi)",
 )
 critic_target.mistake("What comes later counts gamma times as much.", "gamma * ", "")
 critic_target.mistake(
@@ -377,12 +405,14 @@ follow.mistake(
         if not log_pi.requires_grad:
             raise ValueError("detach_() cuts the caller's own tensor off: detach() makes a new one")
         if ask == "loss":
-            return loss.detach()
-        if loss.requires_grad:
+            return loss
+        if torch.is_tensor(loss) and loss.requires_grad:
             loss.sum().backward()
         leaf = log_alpha if ask == "alpha" else log_pi
         gradient = torch.zeros_like(leaf) if leaf.grad is None else leaf.grad
-        return (leaf.detach() - 0.1 * gradient).exp() if ask == "alpha" else gradient
+        if ask == "alpha":
+            return {"alpha after a step of 0.1 downhill": (leaf - 0.1 * gradient).exp()}
+        return {"the gradient for log_pi": gradient}
     """,
 )
 def temperature_loss(log_alpha, log_pi, target_entropy):
@@ -390,20 +420,21 @@ def temperature_loss(log_alpha, log_pi, target_entropy):
     return -(alpha * (log_pi.detach() + target_entropy)).mean()
 
 
-def _temperature(rng, ask, entropy=0.0):
-    """A batch whose entropy lies that far above its target."""
+def _temperature(rng, ask, entropy=0.0, log_alpha=(-3, -0.5)):
+    """A batch whose entropy lies that far above its target, and log_alpha between these bounds."""
     target = float(rng.uniform(-6, -1))
     log_pi = _normal(rng, int(rng.integers(24, 48)))
     log_pi = log_pi - log_pi.mean() - target - entropy
-    return _uniform(rng, -3, -0.5), log_pi, target, ask
+    return _uniform(rng, *log_alpha), log_pi, target, ask
 
 
 temperature_loss.check(
-    "the value of the loss", lambda rng: _temperature(rng, "loss", rng.choice([-2, 2]))
+    "the value of the loss",
+    lambda rng: _temperature(rng, "loss", rng.choice([-2, 2]), log_alpha=(-6, -5.2)),
 )
 temperature_loss.check(
     "entropy below its target: a step downhill raises alpha",
-    lambda rng: _temperature(rng, "alpha", -2),
+    lambda rng: _temperature(rng, "alpha", -2, log_alpha=(2.2, 3)),
 )
 temperature_loss.check(
     "entropy above its target: a step downhill lowers alpha",
@@ -427,6 +458,11 @@ temperature_loss.mistake(
     "Eq. 18 multiplies by alpha; you multiply by its logarithm.",
     "log_alpha.exp()",
     "log_alpha",
+)
+temperature_loss.mistake(
+    "log_alpha is taken as it is, however high or low: alpha is its exponential.",
+    "log_alpha.exp()",
+    "log_alpha.clamp(-5, 2).exp()",
 )
 temperature_loss.mistake(
     "The value is right, but the gradient also runs into log_pi and changes the policy: stop it "
@@ -480,8 +516,8 @@ temperature_loss.mistake(
         critics = lambda s, a: -3 * ((a - torch.tanh(s @ peaks)) ** 2).sum(-1)
         loss = actor_loss(actor, critics, s, noise, log_alpha)
         if ask == "loss":
-            return loss.detach()
-        if loss.requires_grad:
+            return loss
+        if torch.is_tensor(loss) and loss.requires_grad:
             loss.sum().backward()
         leaf = weight if ask == "actor" else log_alpha
         return torch.zeros_like(leaf) if leaf.grad is None else leaf.grad

@@ -249,14 +249,22 @@ def _creeps(rng):
     return target - 0.06 - rng.uniform(0, 0.01) + 0.01 * dt * np.arange(int(13 / dt)), target, dt
 
 
+def _at_the_bounds(rng):
+    """One that rests too far off, and is then put just 5 cm off, and moved at just 2 cm/s.
+
+    Its target is 0 and its time a power of 2, so that no sum and no quotient rounds.
+    """
+    x = _stop(rng, rng.choice([-1, 1]) * rng.uniform(0.06, 0.2))
+    x, dt = x[0] - x[1], 2.0 ** -int(rng.integers(4, 6))
+    just, step = rng.choice([-0.05, 0.05]), rng.choice([-1, 1]) * 0.02 * dt
+    return np.concatenate([x, [just, just, -just, -just, 0.03, 0.03, 0, step, 0, step]]), 0.0, dt
+
+
 solved.check(
     "a puck that comes to rest at the target",
     lambda rng: _stop(rng, rng.uniform(-0.045, 0.045)),
 )
-solved.check(
-    "one that rests elsewhere",
-    lambda rng: _stop(rng, rng.choice([-1, 1]) * rng.uniform(0.06, 0.2)),
-)
+solved.check("one that rests elsewhere, or moves or lies just at a bound", _at_the_bounds)
 solved.check("one that slides across the target and on", _across)
 solved.check("one that slides across and back", lambda rng: _across(rng, turns=True))
 solved.check("one that rests at the target and is hit away", _hit_away)
@@ -284,6 +292,22 @@ solved.mistake(
     "moment.",
     "& (speed < 0.02)",
     "",
+)
+solved.mistake(
+    "Nearer than 0.05 m and slower than 0.02 m/s: a step just at a bound does not count, < and not "
+    "<=.",
+    "< 0.05) & (speed < 0.02)",
+    "<= 0.05) & (speed <= 0.02)",
+)
+solved.mistake(
+    "Slower than 0.02 m/s: a step of just that speed does not count, < and not <=.",
+    "speed < 0.02",
+    "speed <= 0.02",
+)
+solved.mistake(
+    "Nearer than 0.05 m: a puck just that far off does not count, < and not <=.",
+    "< 0.05",
+    "<= 0.05",
 )
 solved.mistake(
     "Near and slow have to hold together; yours is content with one of them.",

@@ -7,7 +7,8 @@ from tests.grade.exercise import exercise
 
 def _video(rng):
     """Mostly a still picture, with something that moves across it."""
-    T, H, W = (int(n) for n in rng.integers((8, 9, 12), (12, 13, 17)))
+    T, *size = (int(n) for n in rng.integers((8, 9, 13), (12, 13, 17)))
+    H, W = rng.permutation(size)
     frames = np.repeat(rng.integers(30, 220, (1, H, W, 3)), T, axis=0)
     for t in range(T):
         frames[t, 2:6, t : t + 3] = rng.integers(0, 256, 3)
@@ -20,6 +21,18 @@ def _grey(rng):
     apart = np.abs(grey - np.median(grey, axis=0)).astype(int)
     some = np.unique(apart[(apart > 4) & (np.median(grey, axis=0) % 1 == 0)])
     return np.repeat(grey, 3, axis=-1), float(rng.choice(some))
+
+
+def _lamp(rng):
+    """Lamps that burn in half of an even number of frames: the median lies halfway between, and all
+    frames are as far off it, at some pixels half a grey more than a whole number."""
+    video, apart = _video(rng), int(rng.integers(8, 40))
+    video = video[: len(video) // 2 * 2]
+    dark = rng.integers(20, 120, (4, 4, 1)).repeat(3, -1)
+    bright = dark + 2 * apart + rng.permutation([1, 9] * 8).reshape(4, 4, 1)
+    burns = rng.permutation(len(video)) % 2 == 0
+    video[:, -5:-1, -5:-1] = np.where(burns[:, None, None, None], bright, dark)
+    return video, apart + 0.25
 
 
 @exercise("8.2", "What stands out from the median")
@@ -59,7 +72,25 @@ foreground.mistake(
     "> threshold",
     ">= threshold",
 )
-foreground.check("another threshold", lambda rng: (_video(rng), float(rng.uniform(5, 60))))
+foreground.check("another threshold, and a lamp that burns in half of the frames", _lamp)
+foreground.mistake(
+    "The median of an even number of frames may end in a half, which integers cut off: leave it a "
+    "float.",
+    "np.median(video, axis=0)",
+    "np.median(video, axis=0).astype(int)",
+)
+foreground.mistake(
+    "Differences from a median that ends in a half end in one, too, and integers cut it off: leave "
+    "them floats.",
+    "np.abs(video - np.median(video, axis=0))",
+    "np.abs(video - np.median(video, axis=0)).astype(int)",
+)
+foreground.mistake(
+    "The median of an even number of frames is the mean of the two in the middle; you take the "
+    "upper one.",
+    "np.median(video, axis=0)",
+    "np.sort(video, axis=0)[len(video) // 2]",
+)
 foreground.check(
     "darker than the background counts as well",
     lambda rng: (255 - _video(rng) // 2, float(rng.uniform(10, 25))),

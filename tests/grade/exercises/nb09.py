@@ -22,6 +22,7 @@ from tests.grade.exercise import exercise
             body = make_drawer(client, friction)
             mass = p.getDynamicsInfo(body, 0, client)[0]
             low, high = p.getAABB(body, 0, client)
+            base = p.getBasePositionAndOrientation(body, client)[0]
             parts = len(p.getCollisionShapeData(body, -1, client))
             q = []
             for step in range(int(250 * seconds) + 75):  # then it is let go for 0.3 s
@@ -30,8 +31,11 @@ from tests.grade.exercise import exercise
                 if step < 250 * seconds:
                     p.applyExternalForce(body, 0, (force, 0, 0), (0, 0, 0), p.LINK_FRAME, client)
                 p.stepSimulation(client)
-            size = np.subtract(high, low)
-            return {"joint": np.array(q), "mass": mass, "size": size, "shapes of the base": parts}
+            size, middle = np.subtract(high, low), np.add(high, low) / 2
+            return {
+                "joint": np.array(q), "mass": mass, "size": size, "shapes of the base": parts,
+                "the base's place": np.array(base), "the drawer's place at its start": middle,
+            }
         finally:
             for world in (client, *others):
                 p.disconnect(world)
@@ -127,6 +131,22 @@ make_drawer.mistake(
     "The base has no shape of its own: it would stand in the drawer's way.",
     "baseMass=0, ",
     "baseMass=0, baseCollisionShapeIndex=shape, ",
+)
+make_drawer.mistake(
+    "Open is said twice: the link stands at the base's place, (0, 0, 0), and the joint alone opens "
+    "it, to -0.15.",
+    "linkPositions=[(0, 0, 0)]",
+    "linkPositions=[(-0.15, 0, 0)]",
+)
+make_drawer.mistake(
+    "The link stands at the base's place: linkPositions=[(0, 0, 0)]. Yours is half a height above.",
+    "linkPositions=[(0, 0, 0)]",
+    "linkPositions=[(0, 0, 0.04)]",
+)
+make_drawer.mistake(
+    "The base stands at the origin; yours is half a height above it.",
+    "baseMass=0, ",
+    "baseMass=0, basePosition=(0, 0, 0.04), ",
 )
 make_drawer.mistake(
     "Your calls go to another world than the one you were given: physicsClientId=client in every "

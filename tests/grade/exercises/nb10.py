@@ -42,10 +42,10 @@ def _between(got, args):
     right = wilson.run(wilson.source)(args)
     for k, n, ends, want in zip(*args, got, right, strict=True):
         if wrong := different(ends, want, wilson.checks[0]):
-            return f"{k} of {n}: {wrong}"
+            return f"{k} wins of {n}: {wrong}"
         low, high = ends
         if low < 0 or high > 1:
-            return f"{k} of {n} gives {low!r} to {high!r}: cut off what lies outside 0 to 1"
+            return f"{k} wins of {n} give {low!r} to {high!r}: cut off what lies outside 0 to 1"
     return None
 
 

@@ -24,8 +24,8 @@ def _normal(rng, *shape, scale=1.0):
         D_y = lambda v: c[1] * torch.sin(v[:, :1]) - 0.4
         loss = cyclegan_loss(x, y, to_y, to_x, D_x, D_y, lam)
         if ask == "loss":
-            return loss.detach()
-        if loss.requires_grad:
+            return loss
+        if torch.is_tensor(loss) and loss.requires_grad:
             loss.sum().backward()
         return torch.zeros_like(w) if w.grad is None else w.grad
     """,
@@ -146,10 +146,12 @@ cyclegan_loss.mistake(
     def probe(pool, made, size, coins, places, ask):
         w = torch.ones((), requires_grad=True)  # what made the images
         shown, pool = swap(pool, w * made, size, coins, places)
+        if not torch.is_tensor(shown):
+            raise ValueError(f"what is shown is a {type(shown).__name__}: stack it to one tensor")
         if ask == "gradient":
             tied = [v.requires_grad for v in (shown, *pool)]
-            return {"shown": shown.detach() + float(tied[0]), "of the pool, tied": sum(tied[1:])}
-        return {"shown": shown.detach(), "pool": [v.detach() for v in pool]}
+            return {"shown": shown, "tied to the generator: what is shown, of the pool": tied}
+        return {"shown": shown, "pool": list(pool)}
     """,
 )
 def swap(pool, made, size, coins, places):
@@ -299,8 +301,8 @@ swap.mistake(
         classify = lambda v: (w * torch.sin(2 * v)).sum((1, 2, 3))
         loss = mixup_loss(classify, goals, others, share, partner)
         if ask == "loss":
-            return loss.detach()
-        if loss.requires_grad:
+            return loss
+        if torch.is_tensor(loss) and loss.requires_grad:
             loss.sum().backward()
         return torch.zeros_like(w) if w.grad is None else w.grad
     """,
@@ -462,13 +464,13 @@ mixup_loss.mistake(
         actor = lambda h: torch.tanh(h @ w["actor"])
         losses = sac_ae_losses(encoder, decoder, critic, actor, x, a, y, lam)
         if ask == "losses":
-            return [loss.detach() for loss in losses]
+            return list(losses)
         which, names = {
             "critic": (0, ("encoder", "critic")),
             "autoencoder": (1, ("encoder", "decoder")),
             "actor": (2, ("encoder", "actor")),
         }[ask]
-        if losses[which].requires_grad:
+        if torch.is_tensor(losses[which]) and losses[which].requires_grad:
             losses[which].sum().backward()
         of = {name: w[name] for name in names}
         return {n: torch.zeros_like(v) if v.grad is None else v.grad for n, v in of.items()}

@@ -154,7 +154,22 @@ longest_piece.mistake(
     "times[piece[1] - 1] - times[piece[0]]",
     "times[min(piece[1], len(times) - 1)] - times[piece[0]]",
 )
-longest_piece.check("a clip without a cut", lambda rng: _cut_film(rng, [int(rng.integers(5, 12))]))
+def _brisk(rng):
+    """A clip without a cut, in which the hand once is just as fast as it may be: (3, 4) fifths of
+    that in times of 64ths, so that no sum and no quotient rounds."""
+    steps, most = rng.integers(2, 40, int(rng.integers(6, 12))) / 64, 5 * int(rng.integers(12, 60))
+    shares = rng.permutation([4, *rng.integers(1, 4, len(steps) - 1)]) / 4
+    ways = (most / 5 * steps * shares)[:, None] * np.array([3, 4])
+    tip = (150, 90) + np.concatenate([[[0, 0]], np.cumsum(ways, axis=0)])
+    return np.concatenate([[0], np.cumsum(steps)]), tip, float(most)
+
+
+longest_piece.check("a clip without a cut, at just the highest speed once", _brisk)
+longest_piece.mistake(
+    "A cut is where the speed exceeds `most`: a hand that is just as fast is no cut, > and not >=.",
+    "speed > most",
+    "speed >= most",
+)
 longest_piece.check(
     "few frames that last long against many that do not",
     lambda rng: _cut_film(rng, [5, int(rng.integers(9, 12)), 6], slow=2, waits=False),

@@ -15,27 +15,32 @@ def there_and_back(points, there, back, most):
     return inside & (np.linalg.norm(home - points, axis=1) < most)
 
 
+# How points miss their start, x and y: five is `most`, so it is (3, 4), too.
+MISSES = (1, 1), (3, 4), (3, 3), (4, 4), (1, 7), (7, 1), (4, 3)
+
+
 def _flows(rng, leaves=0.0):
     """Points, two flows, and what they may be off; a share of the points `leaves` the picture.
 
-    Half of those that stay come home, half do not. Those that leave would come home by the flow at
-    the picture's rim. Each point misses in x and in y, so that neither alone decides.
+    These leave by each of its sides in turn, and would come home by the flow at the rim and by that
+    at the other side, where no other point comes. All numbers are 64ths, so that sums are exact.
     """
-    size = np.array([rng.integers(20, 30), rng.integers(31, 40)])  # height, width
-    n, most = int(rng.integers(10, 16)), float(rng.uniform(0.3, 1.5))
-    there, back = (rng.normal(0, 3, (*size, 2)) for _ in range(2))
-    grid = np.stack(np.meshgrid(np.arange(4, 16), np.arange(4, 16)), -1).reshape(-1, 2)
-    points = grid[rng.choice(len(grid), n, replace=False)]
-    for k, (x, y) in enumerate(points):
-        way = rng.integers(-3, 4, 2) + rng.uniform(-0.4, 0.4, 2)
-        out = k < leaves * n
-        there[y, x] = (-x - rng.uniform(2, 4), way[1]) if out else way
-        to = points[k] + there[y, x]
-        i, j = np.round(to).astype(int).clip(0)
-        miss = most * (rng.uniform(0.2, 0.6) if out or k % 2 else rng.uniform(1.3, 2))
-        angle = rng.choice([0.25, 0.75, 1.25, 1.75]) * np.pi
-        back[j, i] = points[k] - to + miss * np.array([np.cos(angle), np.sin(angle)])
-    return points, there, back, most
+    size = rng.permutation([rng.integers(24, 30), rng.integers(31, 40)])  # width, height
+    n, unit = int(rng.integers(16, 22)), int(rng.integers(8, 24)) / 64
+    there, back = (rng.integers(-192, 193, (*size[::-1], 2)) / 64 for _ in range(2))
+    points = rng.choice(np.argwhere(np.ones([min(size) - 16] * 2)) + 8, n, replace=False)
+    for k, p in enumerate(points):
+        to = p + rng.integers(-3, 4, 2) + rng.integers(-25, 26, 2) / 64
+        out, axis = k < leaves * n, k % 2
+        if out:
+            far = rng.integers(100, 250) / 64
+            to[axis] = -far if k % 4 < 2 else size[axis] - 1 + far
+        there[p[1], p[0]] = to - p
+        miss = unit * np.array(MISSES[0 if out else k % len(MISSES)]) * rng.choice([-1, 1], 2)
+        q = np.round(to).astype(int)
+        for x, y in (q.clip(0, size - 1), np.where(q < 0, q + size, q).clip(0, size - 1)):
+            back[y, x] = p - to + miss
+    return points, there, back, 5 * unit
 
 
 there_and_back.check("some come home, some do not", _flows, points=2)
@@ -77,6 +82,57 @@ there_and_back.mistake(
     "np.abs(home - points)[:, 0]",
 )
 there_and_back.mistake(
+    "`most` is a length, the root of the sum of squares; you take the larger of the misses in x "
+    "and in y.",
+    "np.linalg.norm(home - points, axis=1)",
+    "np.abs(home - points).max(1)",
+)
+there_and_back.mistake(
+    "`most` is a length, the root of the sum of squares; you add up the misses in x and in y.",
+    "np.linalg.norm(home - points, axis=1)",
+    "np.abs(home - points).sum(1)",
+)
+there_and_back.mistake(
+    "A point that misses by just `most` is not kept: < and not <=.",
+    "axis=1) < most",
+    "axis=1) <= most",
+)
+there_and_back.mistake(
+    "A point can leave to the left and above, too: there Python counts a negative index from the "
+    "other side, and raises nothing.",
+    "(x >= 0) & ",
+    "",
+    "(y >= 0) & ",
+    "",
+)
+there_and_back.mistake(
+    "shape is (height, width, 2): x has to be less than the width, y less than the height.",
+    "(x < width) & (y >= 0) & (y < height)",
+    "(x < height) & (y >= 0) & (y < width)",
+)
+there_and_back.mistake(
+    "shape is (height, width, 2): the rows come first.",
+    "height, width = there",
+    "width, height = there",
+)
+there_and_back.mistake(
+    "The way home begins at q itself; the pixel nearest to it only says where the flow is asked.",
+    "home = to + back",
+    "home = np.round(to) + back",
+)
+there_and_back.mistake(
+    "B leads from q back to the start, so it is added: home is q + B(q).",
+    "home = to + back",
+    "home = to - back",
+)
+there_and_back.mistake(
+    "A picture is asked for its row first: flow[y, x]. You ask flow[x, y].",
+    "there[points[:, 1], points[:, 0]]",
+    "there[points[:, 0], points[:, 1]]",
+    "back[y.clip(0, height - 1), x.clip(0, width - 1)]",
+    "back[x.clip(0, height - 1), y.clip(0, width - 1)]",
+)
+there_and_back.mistake(
     "A point comes to the pixel nearest to it: round, where you cut the fraction off.",
     "np.round(to).astype(int)",
     "to.astype(int)",
@@ -93,7 +149,8 @@ def object_points(paths, kept, still, gone):
 def _paths(rng, *kinds):
     """Paths (T, n, 2), kept, and the two distances, of points of these kinds and of the object."""
     T = int(rng.integers(12, 30))
-    quarter, still, gone = T // 4, float(rng.uniform(0.5, 1.5)), float(rng.uniform(3, 6))
+    quarter = T // 4
+    still, gone = int(rng.integers(7, 20)) * 5 / 64, int(rng.integers(40, 76)) * 5 / 64
     courses = []
     count = int(rng.integers(3, 6))
     names = [*(k for k in kinds for _ in range(int(rng.integers(2, 4)))), *["object"] * count]
@@ -113,9 +170,31 @@ def _paths(rng, *kinds):
         trembles = 0.2 * still * rng.uniform(-1, 1, (T, 2)) / np.sqrt(2)
         way = far[:, None] * np.array([np.cos(angle), np.sin(angle)]) + trembles
         courses.append(rng.uniform(20, 60, 2) + way - way[0])
-    order = rng.permutation(len(names))
-    kept = np.array(names) != "lost"
+    courses += [] if "slow" not in kinds else _on_the_brink(rng, T, still, gone)
+    order = rng.permutation(len(courses))
+    kept = np.array([*names, *["brink"] * (len(courses) - len(names))]) != "lost"
     return np.stack(courses, 1)[:, order], kept[order], still, gone
+
+
+def _on_the_brink(rng, T, still, gone):
+    """Paths (T, 2) that are just `still` off at a time, that end just `gone` off, and that end a
+    bit more or less than that from the start, but not from the places soon after it.
+
+    The way is (3, 4) fifths, and what is multiplied by it has 64ths, so that lengths are exact.
+    """
+    quarter, found = T // 4, []
+    for rests, ends in (
+        ((0, still), 2 * gone), ((0, 0), gone),
+        ((0.75 * still, -0.75 * still), gone - 0.25 * still),
+        ((0.75 * still, -0.75 * still), gone + 0.25 * still),
+        ((-0.75 * still, 0.75 * still), gone - 0.25 * still),
+        ((-0.75 * still, 0.75 * still), gone + 0.25 * still),
+    ):  # fmt: skip
+        far = np.full(T, float(ends))
+        far[0], far[1], far[2 : quarter + 1] = 0, *rests
+        way = np.array([3, 4]) * rng.choice([-1, 1], 2)
+        found.append(rng.integers(20, 60, 2) + far[:, None] / 5 * way)
+    return found
 
 
 object_points.check(
@@ -131,6 +210,34 @@ object_points.mistake(
     "A point that was lost says nothing about where it went: `kept` has to be True.",
     "kept & rests",
     "rests",
+)
+object_points.mistake(
+    "Less than `still` and more than `gone`: a point that is just as far off is not the object's.",
+    "< still",
+    "<= still",
+    "> gone",
+    ">= gone",
+)
+object_points.mistake(
+    "Less than `still`: a point that is once just as far off does not rest, < and not <=.",
+    "< still",
+    "<= still",
+)
+object_points.mistake(
+    "More than `gone`: a point that ends just as far off has not gone, > and not >=.",
+    "> gone",
+    ">= gone",
+)
+object_points.mistake(
+    "How far a point ends is measured from its start, paths[0]; you measure from where the first "
+    "quarter ended.",
+    "far[-1] > gone",
+    "np.linalg.norm(paths[-1] - paths[len(paths) // 4], axis=1) > gone",
+)
+object_points.mistake(
+    "A point's start is its place in the first frame, paths[0].",
+    "paths - paths[0]",
+    "paths - paths[1]",
 )
 object_points.mistake(
     "The object rests in EVERY frame of the first quarter: a hand moves from the start, and you "
