@@ -6,8 +6,10 @@ else's (`call`): the notebook calls its own function, the grader a process it do
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import threading
+import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
@@ -212,16 +214,14 @@ def _hint(exercise: Exercise, asked: list[Asked]) -> str:
 def _example(exercise: Exercise, asked: list[Asked], call) -> str:
     """The smallest input found that is answered wrongly, as a call to paste, and what is wrong."""
     wrong = [(a.check, a.question.args) for a in asked if a.message]
-    with ALONE:
-        to_try = example.candidates(wrong) if wrong and example.pasted(exercise) else []
-    try:
+    with warnings.catch_warnings(action="ignore"), contextlib.suppress(Lost):
+        with ALONE:
+            to_try = example.candidates(wrong) if wrong and example.pasted(exercise) else []
         for check, args in to_try:
             with ALONE:
                 want, text = example.tried(exercise, args)
             if text and (said := _message(check, call(args)[0], Question(0, args, want))):
                 return f"{text}\n# {said}"
-    except Lost:
-        pass
     return ""
 
 

@@ -14,7 +14,7 @@ from tests.grade.cell.answer import FORBIDDEN, PREAMBLE, Hidden, ask, explained,
 from tests.grade.cell.wire import decode, encode
 from tests.grade.exercise import Exercise, find
 from tests.grade.judge import Result, best, forget, judge
-from tests.grade.sandbox import WALL
+from tests.grade.sandbox import WALL, Lost
 
 
 class StillOpen(Exception):
@@ -24,20 +24,32 @@ class StillOpen(Exception):
         return [str(self)]
 
 
+class TooLong(TimeoutError):
+    """A call that took longer than it may."""
+
+
 class Points(float):
     """What a check cell evaluates to; nbgrader reads it as the points earned."""
 
     def __repr__(self):
         return f"{float(self):g}"
 
+    def _repr_html_(self):
+        """What a reader sees, who has seen them in the report's first line."""
+        return f"<small>(for the gradebook: {self!r})</small>"
+
 
 def check(id: str, seed: int = 0) -> Points:
     """Check exercise `id` ("6.1") of the calling notebook; print what is right and what is not.
 
     seed: other random inputs. Returns the points. Raises StillOpen, a quiet stop, while the
-    exercise is open.
+    exercise is open, and where there is none of that id.
     """
-    exercise = find(id)
+    id = str(id)  # 6.1 without quotes
+    try:
+        exercise = find(id)
+    except KeyError as e:
+        raise StillOpen(*e.args) from None
     space = sys._getframe(1).f_globals
     if exercise.name not in space:
         raise StillOpen(f"Exercise {id}: run the cell that defines {exercise.name} first.")
@@ -73,7 +85,7 @@ def here(exercise: Exercise, space: dict, over: bool):
     exec(PREAMBLE, library := {})
     exec(PREAMBLE + exercise.given, given := {})
     package = {name: _root(value) for name, value in space.items() if _root(value) in FORBIDDEN}
-    why = {name: ImportError(own_lines(root)) for name, root in package.items()}
+    why = {name: ImportError(own_lines(name)) for name in package}
     there = {name: v for name, v in given.items() if name not in space or name in package}
     there |= {name: given[name] for name in exercise.gives if over}
     exec(exercise.probe, probing := {**library, **given, **space, **there})
@@ -82,6 +94,8 @@ def here(exercise: Exercise, space: dict, over: bool):
     def call(args):
         with _within(WALL), _swapped(space, there, package), _hidden():
             value, changed, e = ask(probe, encode(args))
+        if isinstance(e, TooLong):  # one is enough: each of the others would take as long
+            raise Lost(f"{value.text} ({value.line})" if value.line else value.text)
         value = value if e is None else explained(value, e, why)
         return decode(encode(value)), changed
 
@@ -127,13 +141,13 @@ def _hidden():
 
 @contextmanager
 def _within(seconds: int):
-    """Raise TimeoutError in a block that takes longer; only the main thread can be stopped."""
+    """Raise TooLong in a block that takes longer; only the main thread can be stopped."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
 
     def stop(*_):
-        raise TimeoutError(f"no answer within {seconds} s: does a loop never end?")
+        raise TooLong(f"no answer within {seconds} s: does a loop never end?")
 
     # Windows has no alarm: there a thread asks for the interrupt, which comes when a line of Python
     # runs again, so a call that sleeps is waited for.

@@ -46,7 +46,10 @@ class Hidden:
 
 
 def own_lines(name: str) -> str:
-    return f"{name} is not here: an exercise is answered by your own lines"
+    return (
+        f"{name} is not here while an exercise is checked: it is answered by your own lines, with "
+        "its numbers written as numbers"
+    )
 
 
 class Blank:

