@@ -13,7 +13,7 @@ from tests.grade.__main__ import grade_one, noted_seed
 from tests.grade.cell.answer import STUB, learn, statements
 from tests.grade.cell.wire import Other, decode, encode
 from tests.grade.exercise import Exercise, everything, find
-from tests.grade.judge import judge
+from tests.grade.judge import judge, questions
 from tests.grade.notebook import StillOpen, here
 from tests.grade.sandbox import Sandbox
 from tests.grade.submission import Answer, answer, read
@@ -392,6 +392,22 @@ STATED = {
     *(("13.3", name, -1) for name in ("p_0", "to", "d")),
     *(("13.4", name, -1) for name in ("d", "d_next", "g_next", "d_E", "lam")),
 }  # fmt: skip
+
+
+# Exercises with pictures: which argument they are, and the axes of height and width.
+PICTURES = {
+    "4.1": (0, 2, 3), "4.3": (0, 2, 3), "5.1": (0, 1, 2), "5.3": (0, 2, 3), "5.4": (0, 2, 3),
+    "8.2": (0, 1, 2), "8.3": (0, 1, 2), "11.1": (1, 2, 3), "11.3": (1, 2, 3), "11.4": (4, 2, 3),
+    "13.1": (1, 0, 1),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("id", PICTURES)
+def test_pictures_are_higher_than_wide_and_wider_than_high(id):
+    """Or height and width could be exchanged."""
+    which, down, across = PICTURES[id]
+    shapes = [question.args[which].shape for question in questions(ALL[id], 0)]
+    assert any(s[down] > s[across] for s in shapes) and any(s[down] < s[across] for s in shapes)
 
 
 @pytest.mark.parametrize("id", FUNCTIONS)

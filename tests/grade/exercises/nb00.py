@@ -75,6 +75,11 @@ success_rate.mistake(
     "round(float((distances < threshold).mean()), 1)",
 )
 success_rate.mistake(
+    "// cuts off what is behind the point: divide with /.",
+    ".mean()",
+    ".sum() // len(distances)",
+)
+success_rate.mistake(
     "searchsorted counts right only where the distances are sorted: count those below the "
     "threshold.",
     "float((distances < threshold).mean())",

@@ -245,8 +245,8 @@ nullspace.mistake(
                 rows.append(env.step(action))
                 if not np.array_equal(seen, start):
                     raise ValueError(
-                        "an observation changes after it was returned, by later steps: return a new "
-                        "array each time, np.array([x], np.float32)"
+                        "an observation changes after it was returned, by later steps: return a "
+                        "new array each time, np.array([x], np.float32)"
                     )
             obs, reward, terminated, truncated, infos = zip(*rows)
             episodes.append({

@@ -594,6 +594,11 @@ actor_loss.mistake(
     "log_alpha.exp()",
 )
 actor_loss.mistake(
+    "squash takes log_std as it is, and makes its exponential itself.",
+    "squash(mean, log_std, noise)",
+    "squash(mean, log_std.exp(), noise)",
+)
+actor_loss.mistake(
     "Entropy is weighted by alpha; you weight it by its logarithm.",
     "log_alpha.exp().detach()",
     "log_alpha.detach()",

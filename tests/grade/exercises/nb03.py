@@ -350,7 +350,7 @@ def _wish(rng, far):
 to_action.check("a place within one step", lambda rng: _wish(rng, 0.5))
 to_action.check("a place far away: full action, no more", lambda rng: _wish(rng, 5.0))
 to_action.mistake(
-    "An action is at most 1: clip after you have divided by the step.",
+    "An action is at most 1: divide by step first, then clip.",
     "np.clip((wanted - goal) / step, -1, 1)",
     "(wanted - goal) / step",
 )

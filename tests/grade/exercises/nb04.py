@@ -90,6 +90,12 @@ adain.mistake(
     "(h.var((2, 3), unbiased=False, keepdim=True) + 1e-5).sqrt()",
     "h.var((2, 3), unbiased=False, keepdim=True).sqrt() + 1e-5",
 )
+adain.mistake(
+    "torch's std divides by n - 1, and 1e-5 is added to the variance, before the root: take the "
+    "variance with `unbiased=False`, add, and take the root.",
+    "(h.var((2, 3), unbiased=False, keepdim=True) + 1e-5).sqrt()",
+    "h.std((2, 3), keepdim=True) + 1e-5",
+)
 adain.mistake("Add 1e-5 to the variance; yours is without.", " + 1e-5", "")
 adain.mistake(
     "Each image has a look of its own: you give all of the batch that of the first.",
@@ -370,6 +376,11 @@ reconstructions.mistake(
     "The norms here are means of absolute differences, not of squares.", ".abs()", ".square()"
 )
 reconstructions.mistake(
+    "Eq. 2 decodes what was read from x, content and style: G_X(c_x, s_x); yours has y's style.",
+    '(decode["x"](c_x, s_x) - x)',
+    '(decode["x"](c_x, s_y) - x)',
+)
+reconstructions.mistake(
     "Eq. 2 compares an image with itself: G_X(c_x, s_x) with x.",
     '(decode["x"](c_x, s_x) - x)',
     '(decode["x"](c_y, s_x) - y)',
@@ -426,6 +437,11 @@ munit_loss.mistake(
     'L["content_x"] + L["content_y"]',
     '(L["style_x"] + L["style_y"])',
     'L["style_x"] + L["style_y"]',
+)
+munit_loss.mistake(
+    "lam_image weighs both domains: mind the brackets, yours weighs x alone.",
+    '(L["image_x"] + L["image_y"])',
+    'L["image_x"] + L["image_y"]',
 )
 munit_loss.mistake(
     "You leave out domain y as a whole, its part of the game, too.",

@@ -54,6 +54,11 @@ soft_argmax.mistake(
     "p = logits.detach()",
 )
 soft_argmax.mistake(
+    "A map has h rows: y is divided by h, yours by w.",
+    "(2 * torch.arange(h) + 1) / h",
+    "(2 * torch.arange(h) + 1) / w",
+)
+soft_argmax.mistake(
     "Your softmax goes over the keypoints of a cell: it goes over the cells of a keypoint's map.",
     "logits.flatten(2).softmax(-1).view(logits.shape)",
     "logits.softmax(1)",
@@ -291,6 +296,18 @@ transport.mistake(
     "would not learn. No detach around the whole, no numpy, no torch.no_grad.",
     "(1 - h_x) * (1 - h_y) * phi_x + h_y * phi_y",
     "((1 - h_x) * (1 - h_y) * phi_x + h_y * phi_y).detach()",
+)
+transport.mistake(
+    "The values are right, but y's map says where is pasted, and no gradient reaches it: no detach "
+    "of h_y.",
+    "h_x.detach()",
+    "h_x.detach()\n    h_y = h_y.detach()",
+)
+transport.mistake(
+    "The values are right, but 1 - h_y does not come from x: cut off phi_x and h_x alone, or "
+    "nothing.",
+    "(1 - h_x) * (1 - h_y) * phi_x",
+    "((1 - h_x) * (1 - h_y) * phi_x).detach()",
 )
 transport.mistake(
     "What is cut out stays in: x's features are multiplied by (1 - H_x)(1 - H_y).",

@@ -71,6 +71,11 @@ r1.mistake(
 )
 r1.mistake("Your minimum includes the last frame: in Eq. 9 p ends at N - 1.", "z_E[:-1]", "z_E")
 r1.mistake(
+    "A slice leaves its end out: z_E[0 : N - 1] ends with z_E[N - 2], and yours one frame before.",
+    "z_E[:-1]",
+    "z_E[:-2]",
+)
+r1.mistake(
     "Your minimum leaves out the first frame: p = 1 is z_E[0] in Python.", "z_E[:-1]", "z_E[1:-1]"
 )
 r1.mistake(

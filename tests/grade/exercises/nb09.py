@@ -225,6 +225,11 @@ observe.mistake(
     "(z - z_2)",
 )
 observe.mistake(
+    "The second step is a step, z_{t-1} - z_{t-2}; yours is by how much the two steps differ.",
+    "(z_1 - z_2)",
+    "(z - 2 * z_1 + z_2)",
+)
+observe.mistake(
     "The way ahead leads from the robot to the demonstration: target minus z.",
     "(target - z)",
     "(z - target)",

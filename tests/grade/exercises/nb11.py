@@ -97,6 +97,13 @@ cyclegan_loss.mistake(
     "to_x(x_of_y) - y",
 )
 cyclegan_loss.mistake(
+    "An x goes to y first, by G, and comes back by F: F(G(x)). Yours is G(F(x)).",
+    "to_x(y_of_x) - x",
+    "to_y(to_x(x)) - x",
+    "to_y(x_of_y) - y",
+    "to_x(to_y(y)) - y",
+)
+cyclegan_loss.mistake(
     "The cycle's loss is the mean of absolute differences, not of squares.", ".abs()", ".square()"
 )
 cyclegan_loss.mistake(

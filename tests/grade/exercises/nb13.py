@@ -371,6 +371,22 @@ lost_and_found.mistake(
     "    d = np.median((to - p_0)[kept], axis=0)\n",
 )
 lost_and_found.mistake(
+    "With no point kept the object is where it was last, at d; yours goes back to its start.",
+    "    if kept.any():\n        d = np.median((to - p_0)[kept], axis=0)\n",
+    "    d = np.median((to - p_0)[kept], axis=0) if kept.any() else np.zeros(2)\n",
+)
+lost_and_found.mistake(
+    "A displacement is counted from the start, p_0, and not from the last one: the median alone.",
+    "d = np.median",
+    "d = d + np.median",
+)
+lost_and_found.mistake(
+    "The kept ones stay where flow has found them, and the lost ones are put at p_0 + d; yours is "
+    "the other way round.",
+    "np.where(kept[:, None], to, p_0 + d)",
+    "np.where(kept[:, None], p_0 + d, to)",
+)
+lost_and_found.mistake(
     "A displacement is a place now minus a place at the start; you take the places themselves.",
     "(to - p_0)[kept]",
     "to[kept]",
@@ -499,6 +515,26 @@ reward.mistake(
     "L is the LONGEST displacement; the last need not be it.",
     "np.linalg.norm(d_E, axis=1).max()",
     "np.linalg.norm(d_E[-1])",
+)
+reward.mistake(
+    "An arm that is away costs, as r1 and r2 do: r3 has a minus, too.",
+    "r3 = -(",
+    "r3 = (",
+)
+reward.mistake(
+    "A length in pixels is cut off at 2 L, and then divided by L; yours is cut off at 2 pixels.",
+    "min(np.linalg.norm(x), 2 * L) / L",
+    "min(np.linalg.norm(x), 2) / L",
+)
+reward.mistake(
+    "L is the longest displacement, from the start; yours is the length of the path.",
+    "np.linalg.norm(d_E, axis=1).max()",
+    "np.linalg.norm(np.diff(d_E, axis=0), axis=1).sum()",
+)
+reward.mistake(
+    "The step t leads from the demonstration's frame t to t + 1; yours is one later.",
+    "d_E[min(t, last)], d_E[min(t + 1, last)]",
+    "d_E[min(t + 1, last)], d_E[min(t + 2, last)]",
 )
 reward.mistake(
     "The weights belong to r1, r2 and r3 in this order.",
