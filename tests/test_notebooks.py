@@ -37,9 +37,9 @@ def of(path):
 
 
 def grading(notebook):
-    """grade id -> cell."""
-    cells = [c for c in notebook.cells if "nbgrader" in c.metadata]
-    return {c.metadata.nbgrader.grade_id: c for c in cells}
+    """grade id -> cell, but for a star's, which is worth no points."""
+    cells = {c.metadata.nbgrader.grade_id: c for c in notebook.cells if "nbgrader" in c.metadata}
+    return {id: cell for id, cell in cells.items() if not id.startswith("star-")}
 
 
 def test_every_exercise_belongs_to_a_notebook():

@@ -1,0 +1,1 @@
+"""The stars of the notebooks, a file each."""

@@ -1,0 +1,135 @@
+"""The stars: each shines for the kit's solution and not for a first thought, and waits if open."""
+
+import ast
+import functools
+import math
+import re
+
+import cv2
+import nbformat
+import numpy as np
+import pytest
+
+from solutions.__main__ import NOTEBOOKS, sources
+from tests.grade import star
+from tests.grade.exercise import everything
+from tests.grade.star import Star, find
+from tests.grade.submission import answer, read
+
+# What one thinks of first, as the text of its notebook says it.
+FIRST = {
+    0: """
+def blind(t):
+    return (0, 0, -1) if t < 8 else (0.25, 0, 0)
+""",
+    6: """
+def patient(z_E):
+    t = 0
+
+    def pay(z, z_next):
+        nonlocal t
+        t += 1
+        return -np.linalg.norm(z_next - z_E[min(t, len(z_E) - 1)])
+
+    return pay
+""",
+    7: """
+def hit(target, tries):
+    v, d = tries[-1] if tries else (1.0, 1 / (2 * 0.14 * 9.81))
+    return v * (target / d) ** 0.5
+""",
+}
+by_star = pytest.mark.parametrize("number", FIRST)
+
+
+@functools.cache
+def cells(number, folder=None):
+    """The star's text, its cell and the cell that measures it."""
+    path = sources()[number]
+    book = nbformat.read((folder or path.parent) / path.name, 4).cells
+    ids = [c.metadata.get("nbgrader", {}).get("grade_id") for c in book]
+    i = ids.index(f"star-{number}")
+    return [c.source for c in book[i - 1 : i + 2]]
+
+
+def defined(number, source):
+    """The answer that a cell defines, under the name that is measured."""
+    exec(source, space := {"np": np, "cv2": cv2})
+    return space[re.fullmatch(rf"star\({number}, (\w+)\)", cells(number)[2])[1]]
+
+
+def test_every_star_of_a_notebook_is_tried_here():
+    marked = {p.stem[:2] for p in sources() if "# Star " in p.read_text(encoding="utf-8")}
+    assert marked == {f"{number:02}" for number in FIRST}
+
+
+@by_star
+def test_the_kits_solution_shines_and_reaches_what_is_said(number):
+    found = find(number)
+    reached = found.measure(defined(number, cells(number)[1]))
+    assert found.shines(reached)
+    assert reached == pytest.approx(found.ours, rel=0.02)
+
+
+@by_star
+def test_a_first_thought_does_not_shine_and_reaches_what_is_said(number):
+    found = find(number)
+    reached = found.measure(defined(number, FIRST[number]))
+    assert not found.shines(reached)
+    assert reached == pytest.approx(found.naive, rel=0.02)
+
+
+@by_star
+def test_the_text_says_what_is_known(number):
+    found, text = find(number), cells(number)[0]
+    for value in (found.bar, found.naive, found.ours):
+        assert re.search(rf"(?<![\d.]){re.escape(f'{value:g}')}(?![\d]|\.\d)", text), value
+    assert "worth no points" in text
+
+
+@by_star
+def test_an_open_star_lets_the_notebook_go_on(number, capsys):
+    _, stub, measured = cells(number, NOTEBOOKS)
+    exec(f"{stub}\n{measured}", {"star": star})
+    assert capsys.readouterr().out.startswith(f"Star {number} is open.")
+
+
+@by_star
+def test_a_star_answers_no_exercise(number):
+    """Nor does its name, by which the grader looks for answers whose marks are gone."""
+    book = read(NOTEBOOKS / sources()[number].name)
+    (cell,) = [c for c in book.cells if c.source.startswith(f"# Star {number}\n")]
+    assert not cell.exercise
+    names = {e.name for e in everything().values()}
+    assert not names & {n.name for n in ast.parse(cell.source).body}
+
+
+def test_an_answered_star_leaves_open_exercises_open():
+    path = NOTEBOOKS / sources()[0].name
+    book = read(path)
+    for cell in book.cells:
+        if cell.source.startswith("# Star 0\n"):
+            cell.source, cell.course = FIRST[0], False
+    assert all(answer(everything()[id], [book]).open for id in ("0.1", "0.2"))
+
+
+@pytest.mark.parametrize(
+    ("naive", "reached", "shines"),
+    [(0.5, 0.9, True), (0.5, 0.89, False), (1.5, 0.9, True), (1.5, 0.91, False)]
+    + [(0.5, math.nan, False), (1.5, math.nan, False)],
+)
+def test_from_the_bar_on_it_shines_on_the_side_away_from_the_naive(naive, reached, shines):
+    assert Star(None, "", bar=0.9, naive=naive, ours=0.9).shines(reached) is shines
+
+
+def test_what_an_answer_raises_is_shown():
+    def blind(t):
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        star(0, blind)
+
+
+def test_a_notebook_without_a_star_is_named():
+    with pytest.raises(ValueError, match="notebook 99 has no star"):
+        star(99, print)
