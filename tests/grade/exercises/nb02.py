@@ -539,7 +539,8 @@ def _policy(rng, ask):
     """A linear actor of S numbers, two bowls as critics, a batch of B."""
     B, S, A = (int(n) for n in rng.integers((9, 3, 1), (14, 6, 4)))
     weight, peaks = _normal(rng, S, 2 * A, scale=0.4), _normal(rng, 2, S, A)
-    return weight, peaks, _normal(rng, B, S), _normal(rng, B, A), _uniform(rng, -2, -0.5), ask
+    log_alpha = _uniform(rng, 2.2, 3) if ask == "loss" else _uniform(rng, -2, -0.5)
+    return weight, peaks, _normal(rng, B, S), _normal(rng, B, A), log_alpha, ask
 
 
 actor_loss.check("the value of the loss", lambda rng: _policy(rng, "loss"))
@@ -592,6 +593,11 @@ actor_loss.mistake(
     "its own.",
     "log_alpha.exp().detach()",
     "log_alpha.exp()",
+)
+actor_loss.mistake(
+    "log_alpha is taken as it is, however high or low: alpha is its exponential.",
+    "log_alpha.exp()",
+    "log_alpha.clamp(-5, 2).exp()",
 )
 actor_loss.mistake(
     "squash takes log_std as it is, and makes its exponential itself.",

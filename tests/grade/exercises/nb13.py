@@ -35,6 +35,7 @@ def _flows(rng, leaves=0.0):
         if out:
             far = rng.integers(100, 250) / 64
             to[axis] = -far if k % 4 < 2 else size[axis] - 1 + far
+            to[1 - axis] = 9 + 3 * (k // 4)  # or two would share a pixel of the rim
         there[p[1], p[0]] = to - p
         miss = unit * np.array(MISSES[0 if out else k % len(MISSES)]) * rng.choice([-1, 1], 2)
         q = np.round(to).astype(int)
@@ -413,6 +414,11 @@ lost_and_found.mistake(
     "torch.median the lower one.",
     "np.median((to - p_0)[kept], axis=0)",
     "np.sort((to - p_0)[kept], axis=0)[(kept.sum() - 1) // 2]",
+)
+lost_and_found.mistake(
+    "The median of an even number of points lies between the middle two; yours is the upper one.",
+    "np.median((to - p_0)[kept], axis=0)",
+    "np.sort((to - p_0)[kept], axis=0)[kept.sum() // 2]",
 )
 
 
