@@ -137,6 +137,11 @@ to_pixels.mistake(
     "/ 2 * (size - 1)",
 )
 to_pixels.mistake(
+    "Pixels are counted from 0 here, at the left and upper edge, to `size`: yours from 1.",
+    "(z + 1) / 2 * size",
+    "(z + 1) / 2 * (size - 1) + 1",
+)
+to_pixels.mistake(
     "x comes first in both: column before row.",
     "(z + 1) / 2 * size",
     "(z[..., ::-1] + 1) / 2 * size",

@@ -328,6 +328,11 @@ Point.mistake(
     "self.t > 50",
 )
 Point.mistake(
+    "The step after reset is the first: yours is over at the 49th.",
+    "self.t >= 50",
+    "self.t >= 49",
+)
+Point.mistake(
     "Success does not end the episode: it never terminates.",
     "float(done), False",
     "float(done), done",

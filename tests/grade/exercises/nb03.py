@@ -54,6 +54,11 @@ minimum_jerk.mistake(
 minimum_jerk.mistake(
     "The hand goes from start to end; yours comes back.", "start, end):", "end, start):"
 )
+minimum_jerk.mistake(
+    "A row is a time and a column a coordinate: (n, 3).",
+    "start + s[:, None] * (end - start)",
+    "(start + s[:, None] * (end - start)).T",
+)
 minimum_jerk.mistake("The powers in the polynomial are 3, 4 and 5.", "s**3 * (10", "s * (10")
 minimum_jerk.mistake("The hand begins at `start`: add the share of the way to it.", "start + ", "")
 minimum_jerk.mistake(

@@ -362,6 +362,16 @@ trim.mistake(
     "all(np.linalg.norm(z[i] - z[k]) >= least for k in kept)",
 )
 trim.mistake(
+    "The last frame stays, even if it is near the one before it.",
+    "[len(z) - 1]]",
+    "[len(z) - 1] * (np.linalg.norm(z[-1] - z[kept[-1]]) >= least)]",
+)
+trim.mistake(
+    "The last frame stays, even if it is the same as the one before it.",
+    "[len(z) - 1]]",
+    "[len(z) - 1] * bool((z[-1] != z[kept[-1]]).any())]",
+)
+trim.mistake(
     "How far is one length of all 2K numbers; you add up one for each keypoint.",
     "np.linalg.norm(z[i] - z[kept[-1]])",
     "np.linalg.norm(z[i] - z[kept[-1]], axis=-1).sum()",

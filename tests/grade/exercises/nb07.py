@@ -42,6 +42,8 @@ stopping.mistake(
     "v**2 / (2 * mu * g), v / (mu * g)",
     "v**2 / 2 * mu * g, v / mu * g",
 )
+stopping.mistake("The table has g = 9.81 m/s^2; yours is 9.8.", "g = 9.81", "g = 9.8")
+stopping.mistake("The table has g = 9.81 m/s^2; yours is 9.80665.", "g = 9.81", "g = 9.80665")
 stopping.mistake("Friction slows by mu times g: gravity is missing.", "g = 9.81", "g = 1.0")
 stopping.mistake(
     "The energy goes with the square of the speed, and so does the distance.",

@@ -200,6 +200,11 @@ share_inside.mistake(
     "video.astype(float)",
 )
 share_inside.mistake(
+    "Motion is from frame to frame; you compare all frames with the first one.",
+    "np.diff(video.astype(float), axis=0)",
+    "(video[1:].astype(float) - video[0])",
+)
+share_inside.mistake(
     "That is the share outside: the mask is True inside.", "energy[mask]", "energy[~mask]"
 )
 share_inside.mistake(
