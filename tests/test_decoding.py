@@ -285,7 +285,7 @@ def test_why_a_film_does_not_open_is_told_from_its_boxes(tmp_path):
         assert why in decoding._why_closed(path)
 
 
-@pytest.mark.skipif(os.name == "nt", reason="Windows has its devices elsewhere")
+@pytest.mark.skipif(os.name == "nt", reason="needs a system that has its devices as files")
 def test_a_device_is_no_file():
     with pytest.raises(InputError, match="this is a device"):
         look(Path("/dev/null"))
