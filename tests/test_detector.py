@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from lbw_minimal import video
-from lbw_minimal.clips import corners, detector, drawings
+from lbw_minimal.clips import corners, detector, drawings, drawn_camera
 from lbw_minimal.clips.detector import Detector, Found, refine
 from lbw_minimal.clips.detector_networks import CELLS, Network, both_ways, loss, read, target
 from lbw_minimal.clips.drawings import STORIES, Clip, draw_clip
@@ -31,7 +31,7 @@ def black(monkeypatch):
     monkeypatch.setattr(drawings, "a_colour", lambda *_: np.zeros(3))
     monkeypatch.setattr(drawings, "_clutter", lambda *_: None)
     monkeypatch.setattr(drawings, "_bystander", lambda *_: lambda t: drawings.draw.empty())
-    monkeypatch.setattr(drawings, "_developed", lambda rng, f: f.clip(0, 255).astype(np.uint8))
+    monkeypatch.setattr(drawn_camera, "_developed", lambda rng, f: f.clip(0, 255).astype(np.uint8))
 
 
 def off(clip, place):
@@ -78,8 +78,37 @@ def test_the_same_seed_draws_the_same_clip_and_another_seed_another():
 
 
 def test_a_table_below_the_picture_can_be_drawn():
-    """Of five thousand clips the one in which things would have stood between 88 and 84."""
-    assert draw_clip(np.random.default_rng([0, 4780])).frames.any()
+    """Things on it would have to stand between 100 and 84: there are none, and no error."""
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        story = drawings._story(rng, "push", 6)._replace(object=np.full((6, 2), 112.0))
+        assert drawings._room(rng, story)[0].shape == (84, 84, 3)
+
+
+def test_a_smear_is_as_long_as_the_way_and_as_heavy_as_before():
+    """A line of one column that goes 4 pixels to the right is 4 to 6 columns wide, not moved."""
+    layer = drawings.draw.empty()
+    layer[:, 40] = 200
+    smeared = drawings.draw.smeared(layer, np.array([4.0, 0.0])).astype(float)
+    row = smeared[42, :, 3]
+    assert 4 <= (row > 0).sum() <= 6 and abs(row.sum() - 200) < 5
+    assert abs((row * np.arange(84)).sum() / row.sum() - 40) < 0.05
+    down = drawings.draw.smeared(layer, np.array([0.0, 4.0]))
+    np.testing.assert_allclose(down.astype(int), layer.astype(int), atol=2)
+    assert drawings.draw.smeared(layer, np.array([0.4, -0.9])) is layer
+
+
+def test_stripes_are_on_the_sleeve_and_go_across_it():
+    """A sleeve from left to right with two stripes: one a quarter along, one three quarters."""
+    person = drawings.draw.Person(np.random.default_rng(0), 60)
+    person.stripes, person.second = 2, np.full(3, 255.0)
+    layer = drawings.draw.empty()
+    person._striped(layer, np.array([20.0, 42.0]), np.array([60.0, 42.0]), 10, 5)
+    columns, rows = (np.flatnonzero((layer[..., 3] > 128).any(axis)) for axis in (0, 1))
+    assert columns[0] < 30 < columns[-1] and np.diff(columns).max() > 15
+    left, right = (layer[:, c, 3] > 128 for c in (29, 49))
+    assert left.sum() > right.sum() > 10  # it gets narrower towards the hand
+    assert abs(rows.mean() - 41.5) < 1
 
 
 def test_tips_are_at_the_arms_and_objects_in_their_masks():

@@ -38,9 +38,11 @@ MOST = 60  # frames that the median is taken of, spread over the clip
 CLOSER = 0.8  # of the frame's longer side: a second look pays if it takes in less than this
 BATCH = 8
 LEARNING_RATE = 3e-3
-SETTLE = 0.12  # share of the training, at its end, in which the learning rate falls to 0
-POOL = 96  # clips that batches are drawn from
-EVERY = 4  # iterations until the oldest of them makes room for a new one: drawing takes long
+SETTLE = 0.4  # share of the training, at its end, in which the learning rate falls to 0
+POOL = 192  # clips that batches are drawn from
+# Iterations until the oldest of them makes room for a new one. Drawing takes long; but at 4 each
+# clip was seen 32 times, and the loss on clips of the pool was 0.6 lower than on any others.
+EVERY = 2
 LOG_EVERY = 50  # iterations
 
 

@@ -13,7 +13,7 @@ from torch import nn
 
 from lbw_minimal.clips.drawn_shapes import SIZE
 
-WIDTH = 32  # channels
+WIDTH = 48  # channels
 CELLS = 42  # of the map, each way: a cell is two pixels wide
 SIGMA = 2.0  # pixels, of the Gaussian that the map is taught
 CUT = 0.05  # the chance that a place has nothing to do with that in the frame before
@@ -38,7 +38,7 @@ class Network(nn.Module):
         super().__init__()
         self.stem = nn.Sequential(
             nn.PixelUnshuffle(2),  # (B, 48, 42, 42)
-            nn.Conv2d(48, WIDTH, 3, 2, 1, bias=False),  # (B, 32, 21, 21)
+            nn.Conv2d(48, WIDTH, 3, 2, 1, bias=False),  # (B, 48, 21, 21)
             nn.GroupNorm(4, WIDTH),
             nn.ReLU(),
         )

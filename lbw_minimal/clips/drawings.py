@@ -15,6 +15,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
+from lbw_minimal.clips import drawn_camera
 from lbw_minimal.clips import drawn_shapes as draw
 from lbw_minimal.clips.drawn_shapes import ROUND, SIZE, THINGS, a_colour, a_surface
 
@@ -61,7 +62,10 @@ def _ease(t):
 
 
 def _story(rng, kind, T):
-    """Arms come from the left, from above and from below; the camera mirrors half of the clips."""
+    """Arms come from the left, from above and from below; the camera mirrors half of the clips.
+
+    From the left they come as high as the table, too, and may then lie before what they move.
+    """
     half = np.exp(rng.uniform(np.log(1.3), np.log(7.5)) + rng.normal(0, 0.25, 2))
     if kind == "drawer":
         half = rng.uniform((1, 2), (8, 12))
@@ -76,8 +80,8 @@ def _story(rng, kind, T):
         beside = -ahead * (half @ np.abs(ahead)) + (0, half[1] * rng.uniform(-0.8, 0.5))
     else:
         beside = half * rng.uniform(-1.1, 1.1, 2)
-    low, high = (((-45, -35), (5, 45)), ((0, -70), (SIZE, -8)), ((-20, 92), (104, 150)))[
-        rng.choice(3, p=[0.6, 0.25, 0.15])
+    low, high = (((-45, -35), (5, 75)), ((-10, -70), (SIZE, -8)), ((-20, 92), (104, 150)))[
+        rng.choice(3, p=[0.55, 0.33, 0.12])
     ]
     shoulder = rng.uniform(low, high)
     arm = start + beside - shoulder
@@ -118,8 +122,8 @@ def _phases(rng, time):
 def _room(rng, story):
     """What stands still, (84, 84, 3) float32, and its colour where the object begins."""
     layer = draw.empty() + np.array([*a_colour(rng), 255]).astype(np.uint8)
-    _clutter(rng, layer, rng.integers(0, 7), (0, 0), (SIZE, 50))
-    picture = layer[..., :3] * a_surface(rng, rng.uniform(0, 0.06))
+    _clutter(rng, layer, rng.integers(0, rng.choice([7, 25], p=[0.8, 0.2])), (0, 0), (SIZE, 50))
+    picture = layer[..., :3] * a_surface(rng, _strength(rng))
     if rng.random() < 0.85:
         foot = story.object[:, 1].min() + story.half[1]
         top = foot - rng.uniform(0, 12) if rng.random() < 0.75 else rng.uniform(-30, foot - 10)
@@ -129,13 +133,18 @@ def _room(rng, story):
                    (left - wide, bottom)]  # fmt: skip
         layer = draw.empty() + np.array([*a_colour(rng), 255]).astype(np.uint8)
         _clutter(rng, layer, rng.integers(0, 4), (0, np.clip(top, 0, SIZE)), (SIZE, SIZE))
-        wood = layer[..., :3] * a_surface(rng, rng.uniform(0, 0.08))
+        wood = layer[..., :3] * a_surface(rng, _strength(rng))
         table = draw.empty()
         draw.polygon(table, np.array(corners), np.zeros(3))
         share = table[..., 3:] / np.float32(255)
         picture = picture * (1 - share) + wood * share
     x, y = np.clip(story.object[0], 0, SIZE - 1).astype(int)
     return picture, picture[y, x]
+
+
+def _strength(rng):
+    """Of a surface's pattern: most are plain; tiles, bricks, wallpaper, hedges, rugs are not."""
+    return rng.uniform(0, 0.07) if rng.random() < 0.7 else rng.uniform(0.07, 0.3)
 
 
 def _clutter(rng, layer, count, low, high):
@@ -159,6 +168,7 @@ def _object(rng, story, ground) -> Draw:
     kind = rng.choice(THINGS)
     if story.kind == "drawer":
         kind = rng.choice(["front", "door"], p=[0.7, 0.3])
+    reach, thick = rng.uniform(0, 6) * (rng.random() < 0.6), rng.uniform(0.5, 2)  # of a handle
     turn, spin = rng.normal(0, 0.15), rng.normal(0, 0.03) * (kind == "flat")
     tall, hinge = story.half * (0, 1), story.closed + rng.uniform((4, -4), (25, 4))
 
@@ -173,6 +183,9 @@ def _object(rng, story, ground) -> Draw:
             h = 0.8 * tall
             closed = story.closed
             draw.polygon(layer, np.stack([at - h, closed - h, closed + h, at + h]), colour * 0.6)
+            if reach:
+                knob = at - (story.half[0] + reach, 0)
+                draw.stick(layer, at, knob, thick, thick, colours[1])
             draw.thing(layer, "front", at, story.half, colours)
         else:
             draw.thing(layer, kind, at, story.half, colours, turn + spin * t)
@@ -200,8 +213,16 @@ def _mark(rng, story):
 
 
 def _bystander(rng, T) -> Draw:
-    """Something that moves and has nothing to do with the arm."""
+    """Something that moves and has nothing to do with the arm, or somebody: a person behind."""
     at, swing, pace = rng.uniform(0, SIZE, 2), rng.normal(0, 20, 2), rng.uniform(2, 12)
+    if rng.random() < 0.4:
+        somebody = draw.Person(rng, 60)
+        shoulder, swing = at + rng.normal(0, 30, 2), swing / 2
+
+        def stands(t):
+            return somebody.draw(at + swing * np.sin(pace * t / T), shoulder, t / T)
+
+        return stands
     kind, half, colours = rng.choice(THINGS), rng.uniform(1.5, 6, 2), (a_colour(rng), a_colour(rng))
 
     def drawn(t):
@@ -231,6 +252,7 @@ def draw_clip(rng: np.random.Generator, T: int = FRAMES, kind: str | None = None
     bystander = _bystander(rng, T) if rng.random() < 0.12 else None
     reach = np.linalg.norm(story.tip - story.shoulder, axis=1).max()
     person = draw.Person(rng, reach) if has_arm else None
+    exposure = rng.uniform(0, 0.25) * (rng.random() < 0.4)  # of the time from frame to frame
     in_front, shade = rng.random() < 0.5, rng.uniform(0, 0.5) * (rng.random() < 0.6)
     fall, soft = rng.normal((0, 8), 12), rng.uniform(0.5, 5)
     pictures, masks = [], []
@@ -238,6 +260,11 @@ def draw_clip(rng: np.random.Generator, T: int = FRAMES, kind: str | None = None
         picture = draw.over(room, bystander(t)) if bystander else room
         limb = person.draw(story.tip[t], story.shoulder[t], t / T) if person else draw.empty()
         thing = object_(t) if object_ else draw.empty()
+        if exposure and 0 < t < T - 1:
+            limb, thing = (
+                draw.smeared(layer, exposure * (path[t + 1] - path[t - 1]) / 2)
+                for layer, path in ((limb, story.tip), (thing, story.object))
+            )
         picture = picture * _lit(limb, shade, fall, soft)
         for layer in (limb, thing) if in_front else (thing, limb):
             picture = draw.over(picture, layer)
@@ -248,7 +275,7 @@ def draw_clip(rng: np.random.Generator, T: int = FRAMES, kind: str | None = None
     shown = seen > HIDDEN * seen.max()
     places = np.stack([np.where(has_arm, story.tip, np.nan),
                        np.where(shown[:, None], story.object, np.nan)])  # fmt: skip
-    return _camera(rng, pictures, masks, places)
+    return Clip(*drawn_camera.filmed(rng, pictures, masks, places))
 
 
 def _lit(layer, shade, fall, soft):
@@ -258,67 +285,3 @@ def _lit(layer, shade, fall, soft):
     move = np.array([[1, 0, fall[0]], [0, 1, fall[1]]], np.float32)
     dark = cv2.GaussianBlur(cv2.warpAffine(layer[..., 3], move, (SIZE, SIZE)), (0, 0), soft)
     return 1 - np.float32(shade / 255) * dark[..., None]
-
-
-def _camera(rng, pictures, masks, places):
-    """What a camera makes of T pictures and masks, (84, 84, 3 or 2), and of places (2, T, 2)."""
-    T = len(pictures)
-    # It stands and looks somewhat elsewhere, and may shake a little.
-    zoom = np.exp(rng.normal(-0.05, 0.18))
-    view = cv2.getRotationMatrix2D((SIZE / 2, SIZE / 2), rng.normal(0, 6), zoom)
-    view[:, 2] += rng.normal(0, 4, 2)
-    view[0, 1] += rng.normal(0, 0.06)
-    shake = rng.normal(0, 0.3, (T, 2)) * (rng.random() < 0.15)
-    views = [view + [[0, 0, x], [0, 0, y]] for x, y in shake]
-    frames, masks = (
-        np.stack(
-            [
-                cv2.warpAffine(picture, view, (SIZE, SIZE), borderMode=cv2.BORDER_REFLECT)
-                for picture, view in zip(pictures, views, strict=True)
-            ]
-        )
-        for pictures in (pictures, masks)
-    )
-    places = (places - 0.5) @ view[:, :2].T + view[:, 2] + shake + 0.5
-    frames = _developed(rng, frames)
-    edge = np.zeros(2, int)
-    if rng.random() < 0.2:  # black bars beside an upright clip, or above and below a wide one
-        edge[rng.integers(2)] = rng.integers(4, 22)
-        x, y = edge
-        for picture in (frames, masks):
-            picture[:, :, :x] = picture[:, :, SIZE - x :] = 0
-            picture[:, :y] = picture[:, SIZE - y :] = 0
-    places[~((places >= edge) & (places < SIZE - edge)).all(2)] = np.nan
-    if rng.random() < 0.5:
-        frames, masks = frames[:, :, ::-1], masks[:, :, ::-1]
-        places[..., 0] = SIZE - places[..., 0]
-    if rng.random() < 0.08:  # a loop that begins in its middle
-        cut = rng.integers(1, T)
-        frames, masks = np.roll(frames, cut, 0), np.roll(masks, cut, 0)
-        places = np.roll(places, cut, 1)
-    half = (SIZE // 2, SIZE // 2)
-    masks = np.stack([cv2.resize(mask, half, interpolation=cv2.INTER_AREA) for mask in masks])
-    tip, object_ = places.astype(np.float32)
-    return Clip(np.ascontiguousarray(frames), tip, object_, masks)
-
-
-def _developed(rng, frames):
-    """Frames (T, 84, 84, 3) uint8 with light, colour cast, flicker, noise, blur, compression."""
-    T = len(frames)
-    cast = np.exp(rng.normal(0, 0.25) + rng.normal(0, 0.07, 3))
-    flicker = 1 + rng.normal(0, 0.03, (T, 1, 1, 1)) * (rng.random() < 0.3)
-    slope = 1 + rng.normal(0, 0.12) * np.linspace(-1, 1, SIZE)[:, None]
-    frames = frames * np.float32(cast * flicker * slope) + np.float32(rng.normal(0, 12))
-    if rng.random() < 0.6:
-        noise = rng.standard_normal(frames.shape, np.float32)
-        frames += np.float32(rng.uniform(0, 8)) * noise
-    blur = rng.uniform(0.3, 1.1) * (rng.random() < 0.4)
-    quality = [cv2.IMWRITE_JPEG_QUALITY, int(rng.uniform(25, 90))] if rng.random() < 0.4 else None
-    frames = np.clip(frames, 0, 255).astype(np.uint8)
-    for t in range(T):
-        if blur:
-            frames[t] = cv2.GaussianBlur(frames[t], (0, 0), blur)
-        if quality:
-            file = cv2.imencode(".jpg", frames[t], quality)[1]
-            frames[t] = cv2.imdecode(file, cv2.IMREAD_COLOR)
-    return frames

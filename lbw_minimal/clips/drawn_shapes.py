@@ -70,7 +70,7 @@ def a_surface(rng: np.random.Generator, strength: float) -> np.ndarray:
         y, x = np.mgrid[:SIZE, :SIZE]
         a, step = rng.uniform(0, np.pi), rng.uniform(1.5, 15)
         pattern += np.sign(np.sin((x * np.cos(a) + y * np.sin(a)) * 2 * np.pi / step))
-    return (1 + strength * pattern[..., None]).astype(np.float32)
+    return np.maximum(0, 1 + strength * pattern[..., None]).astype(np.float32)
 
 
 # Layers and shapes
@@ -84,6 +84,18 @@ def empty() -> np.ndarray:
 def over(picture: np.ndarray, layer: np.ndarray) -> np.ndarray:
     """The picture (84, 84, 3) with the layer in front of it."""
     return picture * (1 - layer[..., 3:] / np.float32(255)) + layer[..., :3]
+
+
+def smeared(layer: np.ndarray, way: np.ndarray) -> np.ndarray:
+    """The layer as a shutter leaves it that is open while what is on it goes so far, (2,)."""
+    n = int(np.abs(way).max()) + 1
+    if n == 1:
+        return layer
+    kernel = np.zeros((2 * n + 1, 2 * n + 1), np.float32)
+    for along in np.linspace(-0.5, 0.5, 2 * n + 1):
+        x, y = np.round(n + along * way).astype(int)
+        kernel[y, x] += 1 / (2 * n + 1)
+    return cv2.filter2D(layer, -1, kernel, borderType=cv2.BORDER_REPLICATE)
 
 
 def polygon(layer: np.ndarray, points: np.ndarray, colour: np.ndarray, opacity: int = 255) -> None:
@@ -162,13 +174,16 @@ class Person:
         self.down = rng.random() < 0.45  # the hand points down, else along the arm
         self.bend, self.sway = rng.normal(0, 0.45), rng.normal(0, 0.15)  # rad
         self.skin, self.cloth = a_skin(rng), a_colour(rng)
-        self.glove = a_colour(rng) if rng.random() < 0.05 else self.skin
+        self.glove = a_colour(rng) if rng.random() < 0.12 else self.skin
         self.wrist = self.length * rng.uniform(0.15, 0.27)  # radii
         self.elbow = self.wrist * rng.uniform(1.1, 1.9)
         # How far down the forearm the sleeve goes; below 0 there is none.
         self.sleeve = rng.choice([-1.0, 0.0, rng.uniform(0, 1), 1.0])
         self.loose = rng.uniform(1.05, 1.6)  # the sleeve's radius over the arm's
-        self.knit = a_surface(rng, rng.uniform(0, 0.15))
+        self.knit = a_surface(rng, rng.uniform(0, 0.15) if rng.random() < 0.7 else 0.35)
+        self.stripes = rng.integers(3, 10) if rng.random() < 0.25 else 0  # across each half
+        self.second = a_colour(rng)
+        self.watch = a_colour(rng) if rng.random() < 0.15 else None
         self.elbow_side = rng.choice([-1, 1], p=[0.3, 0.7])  # 1: up, if the arm goes right
         self.bones = (reach + self.length) * rng.uniform(0.43, 0.86, 2)
         self.torso = rng.uniform((6, 15), (25, 50)) if rng.random() < 0.35 else None
@@ -209,12 +224,25 @@ class Person:
         thick = 1.2 * self.elbow
         self._limb(layer, shoulder, elbow, thick, self.elbow, self.skin)
         self._limb(layer, elbow, wrist, self.elbow, self.wrist, self.skin)
+        if self.watch is not None:
+            at = wrist + 0.12 * (elbow - wrist)
+            stick(layer, at, at, 1.1 * self.wrist, 1.1 * self.wrist, self.watch)
         if self.sleeve >= 0:
             cuff = elbow + self.sleeve * (wrist - elbow)
             radius = self.elbow + self.sleeve * (self.wrist - self.elbow)
             at_elbow = self.loose * self.elbow
             self._limb(layer, shoulder, elbow, 1.1 * at_elbow, at_elbow, self.cloth)
             self._limb(layer, elbow, cuff, at_elbow, self.loose * radius, self.cloth)
+            self._striped(layer, shoulder, elbow, at_elbow, at_elbow)
+            self._striped(layer, elbow, cuff, at_elbow, self.loose * radius)
+
+    def _striped(self, layer, a, b, ra, rb):
+        """Stripes across a sleeve from a to b, with its radius at both."""
+        ahead = (b - a) / (np.linalg.norm(b - a) + 1e-6)
+        aside = 0.9 * np.array([-ahead[1], ahead[0]])
+        for t in (np.arange(self.stripes) + 0.5) / max(self.stripes, 1):
+            middle, r = a + t * (b - a), ra + t * (rb - ra)
+            stick(layer, middle - r * aside, middle + r * aside, 0.2 * r, 0.2 * r, self.second)
 
     def _limb(self, layer, a, b, ra, rb, colour):
         """A stick with a lit side."""
