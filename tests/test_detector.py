@@ -71,6 +71,29 @@ def test_what_a_story_lacks_is_nowhere(kind):
     assert (arm, thing) == (tip, object_)
 
 
+def unfilmed(monkeypatch, limb):
+    """Forty clips of drawers before a camera sees them, with `limb`, a layer, for all arms."""
+    monkeypatch.setattr(drawings.draw.Person, "draw", lambda *_: limb)
+    monkeypatch.setattr(drawings.draw, "smeared", lambda layer, way: layer)
+    monkeypatch.setattr(drawn_camera, "filmed", lambda rng, p, m, places: (p, *places, m))
+    return [draw_clip(np.random.default_rng(i), 6, "drawer") for i in range(40)]
+
+
+def test_a_drawer_that_is_shut_is_still_there(monkeypatch):
+    """It shows less than a fifth of what it showed when it was open; but nothing hides it."""
+    clips = unfilmed(monkeypatch, drawings.draw.empty())
+    shown = np.array([clip.masks[-1][..., 1].sum() / clip.masks[0][..., 1].sum() for clip in clips])
+    assert shown.min() < 0.2
+    assert all(np.isfinite(clip.object).all() for clip in clips)
+
+
+def test_what_an_arm_hides_all_along_but_for_a_tenth_is_nowhere(monkeypatch):
+    arm = drawings.draw.empty()
+    arm[:, np.arange(84) % 10 > 0] = 255
+    hidden = [np.isnan(clip.object).all() for clip in unfilmed(monkeypatch, arm)]
+    assert 0.2 < np.mean(hidden) < 0.8  # half of the things are in front of the arm
+
+
 def test_the_same_seed_draws_the_same_clip_and_another_seed_another():
     one, same, other = (draw_clip(np.random.default_rng(seed)) for seed in (4, 4, 5))
     assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(one, same, strict=True))
