@@ -38,7 +38,7 @@ MOST = 60  # frames that the median is taken of, spread over the clip
 CLOSER = 0.8  # of the frame's longer side: a second look pays if it takes in less than this
 BATCH = 8
 LEARNING_RATE = 3e-3
-SETTLE = 0.4  # share of the training, at its end, in which the learning rate falls to 0
+SETTLE = 0.75  # share of the training, at its end, in which the learning rate falls to 0
 POOL = 192  # clips that batches are drawn from
 # Iterations until the oldest of them makes room for a new one. Drawing takes long; but at 4 each
 # clip was seen 32 times, and the loss on clips of the pool was 0.6 lower than on any others.
@@ -199,7 +199,7 @@ def train(
     )
     pool, bar = _Pool(seed), progress(iterations, "eyes", now.step)
     while now.step < iterations:
-        # Falling only at the end, the rate up to there does not depend on how long it all takes.
+        # A constant rate soon learns no more: its noise hides what is left to learn.
         left = (1 - now.step / iterations) / SETTLE
         rate = LEARNING_RATE * min(1.0, (now.step + 1) / 100, left)
         optimizer.param_groups[0]["lr"] = rate
