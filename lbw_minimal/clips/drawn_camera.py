@@ -26,7 +26,7 @@ def filmed(
     T = len(pictures)
     # The camera stands and looks somewhat elsewhere, and may shake a little.
     zoom = np.exp(rng.normal(-0.05, 0.18))
-    view = cv2.getRotationMatrix2D((SIZE / 2, SIZE / 2), rng.normal(0, 6), zoom)
+    view = np.array(cv2.getRotationMatrix2D((SIZE / 2, SIZE / 2), rng.normal(0, 6), zoom), float)
     view[:, 2] += rng.normal(0, 4, 2)
     view[0, 1] += rng.normal(0, 0.06)
     shake = rng.normal(0, 0.3, (T, 2)) * (rng.random() < 0.15)
