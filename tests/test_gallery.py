@@ -1,8 +1,10 @@
 """The gallery: one page and two scenes a task, which need nothing but each other."""
 
 import re
+from types import SimpleNamespace
 
 import cv2
+import numpy as np
 from PIL import Image
 
 import tasks
@@ -11,8 +13,9 @@ from tasks.commands import gallery, own_arm
 
 def test_the_page_shows_a_task_with_its_two_scenes(tmp_path, monkeypatch):
     monkeypatch.setattr(tasks, "TASKS", ("reach",))
-    monkeypatch.setattr(own_arm, "prepared", lambda: None)
+    monkeypatch.setattr(own_arm, "prepared", lambda: SimpleNamespace(done=True))
     monkeypatch.setattr(own_arm, "section", lambda clip: "")
+    monkeypatch.setattr(own_arm, "strip", lambda clip: b"six moments")
     page = gallery.write(tmp_path).read_text()
     scenes = re.findall(r'<iframe[^>]* src="([^"]+)"', page)
     assert scenes == ["reach-human.html", "reach-robot.html"]
@@ -21,6 +24,7 @@ def test_the_page_shows_a_task_with_its_two_scenes(tmp_path, monkeypatch):
         assert "MeshCat.Viewer" in scene and len(scene) < 2e6
     assert page.count("<figure>") == 8 + 2  # frames of the demonstration, two scenes
     assert page.count("<video") == 1
+    assert (tmp_path / "lookalike.png").read_bytes() == b"six moments"
     assert page.count('<img class="still" alt="reach, ') == 2  # what is printed of the scenes
     assert str(tmp_path) not in page and str(tasks.ROOT) not in page
     assert not re.search(r'(?:src|href)="(?!data:|reach-)', page)
@@ -33,6 +37,12 @@ def test_a_clip_of_ones_own_is_shown_and_called_a_look_alike():
     moments = own_arm.columns(clip, 6)
     assert len(moments) == 6 and moments[0][0] == 0
     assert all(image.shape == (189 + 252 + 252, 252, 3) for _, image in moments)
+    row = cv2.imdecode(np.frombuffer(own_arm.strip(clip), np.uint8), cv2.IMREAD_COLOR)
+    assert row.shape == (462, 6 * 168, 3)
+    off = row[:, :168, ::-1] - cv2.resize(
+        moments[0][1], (168, 462), interpolation=cv2.INTER_AREA
+    ).astype(float)
+    assert np.abs(off).mean() < 8  # the first moment stands first, in few colours
     page = own_arm.section(clip)
     assert page.count('<img src="data:') == 8 == page.count('alt="At ')
     assert "look-alike" in page and "no real person's clip" in page

@@ -3,7 +3,8 @@ and, below them, what becomes of a clip of one's own.
 
 In: the human videos and the trained weights that come with the kit. Out: `index.html` with the
 pictures in it, and beside it a scene for every task and arm that turns with the mouse, each a file
-of its own, and every task's film as a WebP, for slides and READMEs.
+of its own, and every task's film as a WebP and that clip's pictures as a PNG, for slides and
+READMEs.
 """
 
 from __future__ import annotations
@@ -68,7 +69,10 @@ def write(out: Path) -> Path:
     for name in tasks.TASKS:
         page.append(section(name, out))
         print(f"{name}: done", flush=True)
-    page.append(own_arm.section(own_arm.prepared()))
+    clip = own_arm.prepared()
+    page.append(own_arm.section(clip))
+    if clip.done:
+        write_atomic(out / "lookalike.png", own_arm.strip(clip))
     title, path = "LbW minimal: the five tasks", out / "index.html"
     body, css = "".join(page), CSS + PAIR
     write_atomic(path, HTML.format(title=title, css=css, links=links(path), body=body))

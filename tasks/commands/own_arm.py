@@ -7,10 +7,12 @@ pictures has to say so.
 from __future__ import annotations
 
 import tempfile
+from io import BytesIO
 from pathlib import Path
 
 import cv2
 import numpy as np
+from PIL import Image
 
 import tasks
 from lbw_minimal import imitate
@@ -23,6 +25,7 @@ from tasks.world.scene import FPS
 
 NAME, SEED = "push", 3  # the task, and the seed of its expert
 SCALE = 3  # of the kit's frames
+SHRINK = 2 / 3  # of the gallery's pictures in a README
 
 
 def prepared() -> Prepared:
@@ -55,6 +58,18 @@ def columns(clip: Prepared, n: int = 8) -> list[tuple[float, np.ndarray]]:
         above = cv2.resize(frame, size, interpolation=cv2.INTER_AREA)
         out.append((step / FPS, np.concatenate([above, *below])))
     return out
+
+
+def strip(clip: Prepared) -> bytes:
+    """Six moments of a usable clip side by side as a PNG of 256 colours, for READMEs."""
+    images = [
+        cv2.resize(image, None, fx=SHRINK, fy=SHRINK, interpolation=cv2.INTER_AREA)
+        for _, image in columns(clip, 6)
+    ]
+    file = BytesIO()
+    row = Image.fromarray(np.concatenate(images, axis=1))
+    row.quantize().save(file, "PNG", optimize=True)  # half as large as in all its colours
+    return file.getvalue()
 
 
 def section(clip: Prepared) -> str:
