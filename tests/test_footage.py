@@ -117,39 +117,50 @@ LEFT = (0, 30, 20, 12)
 
 
 @pytest.mark.parametrize(
-    ("other", "two"),
+    ("boxes", "doors"),
     [
-        ((64, 30, 20, 12), True),
-        ((30, 0, 20, 30), False),  # 10 pixels apart: less than 0.15 of the width
-        ((34, 0, 20, 30), True),  # over the upper edge, 14 apart
-        ((40, 30, 20, 12), False),  # over no edge: an object
-        ((59, 30, 20, 12), False),  # 5 pixels from the edge
-        ((60, 30, 20, 12), True),  # 4, a gap that is closed
-        ((80, 10, 4, 4), False),  # too small for an arm
-        ((0, 60, 20, 12), False),  # below the first: as an arm and its sleeve
+        ([LEFT], (0, 0)),
+        ([(64, 30, 20, 12)], (83, 83)),
+        ([(30, 0, 20, 30)], (30, 49)),  # from above
+        ([LEFT, (64, 30, 20, 12)], (0, 83)),
+        ([(0, 30, 84, 12)], (0, 83)),  # two whose hands meet
+        ([LEFT, (79, 10, 5, 20)], (0, 0)),  # 100 pixels, less than 0.015 of the picture
+        ([LEFT, (58, 30, 20, 12)], (0, 0)),  # an object in the picture
+        ([LEFT, (40, 72, 20, 12)], (0, 0)),  # over the lower edge: a table that is moved
+        ([(0, 30, 10, 10), (13, 30, 10, 10)], (0, 0)),  # an arm in pieces, 100 pixels each
+        ([(0, 30, 10, 10), (19, 30, 10, 10)], (np.nan, np.nan)),  # a gap of nine
     ],
 )
-def test_two_arms_come_in_over_the_edge_one_beside_the_other(other, two):
-    assert footage._two_arms(moving(LEFT, other)) == two
-    assert not footage._two_arms(moving(other))
+def test_a_door_is_where_something_large_comes_in(boxes, doors):
+    np.testing.assert_allclose(footage._doors(moving(*boxes)[None])[0], np.array(doors) / 83)
 
 
-def test_an_arm_in_pieces_is_one():
-    """Gaps of up to eight pixels are closed."""
-    pieces = [(x, 30, 6, 12) for x in range(0, 84, 13)]
-    assert not footage._two_arms(moving(*pieces))
+@pytest.mark.parametrize(("side", "where"), [("left", 0), ("right", 1)])
+def test_the_edge_over_which_the_arm_comes_in_is_told(room, side, where):
+    film = arms(room, side)
+    assert footage.enters(film) == where
+    other = arms(room, "left" if side == "right" else "right")[:12]
+    assert footage.enters(np.concatenate([other, film]), cuts=(12,)) == where
+    assert np.isnan(footage.enters(no_arm(room)[0]))
 
 
-@pytest.mark.parametrize(("share", "two"), [(0.15, False), (0.25, True)])
-def test_two_arms_in_a_fifth_of_the_frames_are_two_people(room, share, two, monkeypatch):
-    asked = iter(np.arange(1000) % 100 < 100 * share)
-    monkeypatch.setattr(footage, "_two_arms", lambda step: next(asked))
+def test_a_lamp_that_swings_at_the_edge_is_no_arm(room):
+    film, reason = no_arm(room)
+    for i, frame in enumerate(film):
+        cv2.circle(frame, (130 + int(6 * np.sin(i)), 4), 8, (250, 240, 150), -1)
+    with pytest.raises(Unusable, match=reason):
+        footage.check(film)
+
+
+@pytest.mark.parametrize(("share", "two"), [(0.05, False), (0.15, True)])
+def test_arms_from_both_sides_in_a_tenth_of_the_frames_are_two_people(
+    room, share, two, monkeypatch
+):
+    both = np.array([[0.0, 0.9 if i % 100 < 100 * share else 0.6] for i in range(100)])
+    monkeypatch.setattr(footage, "_doors", lambda moves: both)
     film = arms(room, "left", frames=60)
-    still = np.zeros((103, 84, 84), np.float32)  # a hundred steps of three frames
-    monkeypatch.setattr(footage, "before_background", lambda frames: (still, still[0], True))
-    monkeypatch.setattr(footage, "_comes_in", lambda moves: True)
     if two:
-        with pytest.raises(Unusable, match="two arms"):
+        with pytest.raises(Unusable, match="several people"):
             footage.check(film)
     else:
         assert footage.check(film)[1] == []

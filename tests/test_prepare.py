@@ -75,7 +75,7 @@ def test_a_clip_becomes_a_human_video_that_the_kit_takes_as_its_own(filmed, eyes
 def test_what_is_not_usable_ends_with_2_and_a_page_that_says_why(filmed, eyes, tmp_path, capfd):
     eyes.found = blind(eyes.found)
     assert main(["prepare", "push", str(filmed[0]), "--out", str(tmp_path)]) == 2
-    assert capfd.readouterr().out.startswith("not usable: no arm is seen")
+    assert capfd.readouterr().out.startswith("not usable: the tip of the hand is seen in 0%")
     page = (tmp_path / "prepare.html").read_text()
     assert "Push: not usable" in page and "film from the side" in page and "data-time=" in page
     assert not (tmp_path / "reenactment.mp4").exists()
@@ -166,7 +166,7 @@ def test_the_papers_way_translates_the_clip_itself(tmp_path):
 def test_a_clip_that_is_not_usable_teaches_nothing(filmed, eyes, tmp_path):
     eyes.found = blind(eyes.found)
     arguments = ["--video", str(filmed[0]), "--out", str(tmp_path / "run")]
-    with pytest.raises(InputError, match=r"my push\.mp4: no arm is seen"):
+    with pytest.raises(InputError, match=r"my push\.mp4: the tip of the hand"):
         check("push", parser("push").read(arguments), arguments)
     assert not (tmp_path / "run").exists()
 

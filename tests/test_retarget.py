@@ -224,9 +224,9 @@ def nothing_is_pushed():
     return replace(tracks, object=tracks.object[:1] + 0 * tracks.object), "the object never moves"
 
 
-def no_arm():
+def no_hand():
     tracks = clip()
-    return replace(tracks, tip_sure=0 * tracks.tip_sure), "no arm is seen"
+    return replace(tracks, tip_sure=0 * tracks.tip_sure), "the tip of the hand is seen in 0%"
 
 
 def a_hidden_object():
@@ -264,14 +264,36 @@ def held_from_the_front():
     return replace(tracks, tip=tracks.object + (80, 0)), "the hand is in front of it"
 
 
+def hidden_by_the_arm():
+    """The same, of an arm that comes from behind the object."""
+    return replace(held_from_the_front()[0], enters=0.2), "hides it"
+
+
+def drawn_to_the_arm():
+    """The tip is where it ought to be, and the arm comes in from the other side."""
+    return replace(clip(), enters=0.8), "which so pulls it"
+
+
+def broken_off():
+    """27 pixels from its start, which are less than a tenth of the picture."""
+    return clip(last=1.4), "while the object still gets faster"
+
+
+def the_hand_taken_for_the_object():
+    tracks = clip()
+    slope = tracks.tip + np.stack([0 * tracks.times, 0.5 * tracks.object[:, 0]], 1)
+    return replace(tracks, tip=slope, object=slope + (10, 0)), "is the hand"
+
+
 def lifted():
     tracks = clip()
     up = 90 * np.sin(np.pi * jerk(tracks.times - 1))
     return replace(tracks, object=tracks.object - np.stack([0 * up, up], 1)), "leaves its straight"
 
 
-NOT_USABLE = (nothing_is_pushed, no_arm, a_hidden_object, too_few_frames, short_pieces, from_above,
-              pulled, held_from_the_front, lifted)  # fmt: skip
+NOT_USABLE = (nothing_is_pushed, no_hand, a_hidden_object, too_few_frames, short_pieces, from_above,
+              pulled, held_from_the_front, hidden_by_the_arm, drawn_to_the_arm,
+              the_hand_taken_for_the_object, broken_off, lifted)  # fmt: skip
 
 
 @pytest.mark.parametrize("fault", NOT_USABLE, ids=lambda f: f.__name__)
@@ -281,6 +303,26 @@ def test_a_clip_that_cannot_be_laid_is_refused_with_the_reason_and_a_remedy(faul
         lay(tracks, SCENE)
     assert reason in str(error.value)
     assert str(error.value).count("; ") == 1 and str(error.value).endswith(".")
+
+
+@pytest.mark.parametrize(
+    ("enters", "mirror"), [(0.2, False), (0.8, True), (0.5, False), (0.5, True), (np.nan, False)]
+)
+def test_an_arm_may_come_from_behind_the_object_or_from_above(enters, mirror):
+    lay(replace(clip(camera=mirrored(CAMERA) if mirror else CAMERA), enters=enters), SCENE)
+
+
+def test_a_hand_and_an_object_that_go_along_a_level_table_together_are_both_there():
+    """As in a loop that begins in the middle of the push."""
+    t = np.arange(1, 2.6, 1 / 30)
+    lay(seen(push(t), t), SCENE)
+
+
+@pytest.mark.parametrize(("last", "faster"), [(1.5, True), (1.8, False), (2.3, False)])
+def test_a_clip_that_breaks_off_while_the_object_gets_faster_is_warned_of(last, faster):
+    """Half of the way is gone at 1.5 s, where the object is fastest."""
+    warnings = lay(clip(last=last), SCENE).warnings
+    assert any("still gets faster" in warning for warning in warnings) == faster
 
 
 def test_a_puck_that_is_pushed_to_the_end_is_no_hit():

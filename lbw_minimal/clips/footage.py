@@ -20,13 +20,12 @@ from lbw_minimal.clips.paths import LEAST_FRAMES, SIDE_ON, Unusable
 # Of the longer side: the way of the picture's corners. Below the first a camera stands, above the
 # second near and far things move apart, and no fit undoes it.
 TREMBLES, MOVES = 0.005, 0.09
-LARGE = 0.01  # of the picture: less that moves is no arm
+LARGE = 0.015  # of the picture: less that moves is no arm
 EDGE = 3  # pixels from the picture's edge, over which an arm comes in
 FAINT = 10  # grey levels: at the shoulder an arm moves by little
 SOMETIMES = 2  # frames in which something moves: noise does so in one
-LAG = 3  # of the frames that are looked at, in which an arm moves by less than its width
-APART = 0.15  # of the width: so far apart are the arms of two people
-OFTEN = 0.2  # of the frames in which two arms move
+APART = 0.7  # of the width: one arm never comes in at places so far apart
+OFTEN = 0.1  # of the frames: an arm at its median place is not told from the room
 
 
 def check(frames: np.ndarray, cuts: Sequence[int] = ()) -> tuple[np.ndarray, list[str]]:
@@ -58,36 +57,56 @@ def check(frames: np.ndarray, cuts: Sequence[int] = ()) -> tuple[np.ndarray, lis
         warnings.append("The camera trembles, and the picture was steadied; a stand would help.")
     still, background, _ = before_background(frames[first:last])
     if not _comes_in(np.abs(still - background) > FAINT):
-        raise Unusable("no arm is seen, nothing that moves comes in from the edge", SIDE_ON)
-    steps = np.abs(still[LAG:] - still[:-LAG]) > MOVED  # (T - LAG, 84, 84)
-    if len(steps) and np.mean([_two_arms(step) for step in steps]) > OFTEN:
+        raise Unusable("no arm is seen, nothing large that moves comes in from the edge", SIDE_ON)
+    doors = _doors(np.abs(still - background) > MOVED)
+    if (np.nan_to_num(np.ptp(doors, axis=1)) >= APART).mean() > OFTEN:
         raise Unusable(
-            "two arms come in from the edge of the picture, far apart, as of several people",
+            "arms come in over opposite edges of the picture, as of several people",
             "film one arm, and let nothing else move near the edges",
         )
     return frames, warnings
 
 
+def enters(frames: np.ndarray, cuts: Sequence[int] = ()) -> float:
+    """Where the arm comes into the longest shot, 0 at the picture's left edge, 1 at its right.
+
+    nan if that cannot be told: at its median place an arm looks like the room.
+    """
+    first, last = max(pairwise([0, *cuts, len(frames)]), key=lambda shot: shot[1] - shot[0])
+    still, background, _ = before_background(frames[first:last])
+    doors = _doors(np.abs(still - background) > MOVED)
+    return float(np.nanmean(doors)) if np.isfinite(doors).any() else np.nan
+
+
 def _comes_in(moves):
-    """Whether what moves (T, 84, 84) at some time reaches over the picture's edge, as an arm."""
-    moved = (moves.sum(0) >= SOMETIMES).astype(np.uint8)
-    closed = cv2.morphologyEx(moved, cv2.MORPH_CLOSE, np.ones((9, 9), np.uint8))
-    _, _, stats, _ = cv2.connectedComponentsWithStats(closed)
-    return any(
-        area >= 2 * LARGE * moved.size
-        and (min(x, y) <= EDGE or max(x + width, y + height) >= SMALL - EDGE)
-        for x, y, width, height, area in stats[1:].tolist()
-    )
+    """Whether the largest thing that moves (T, 84, 84) reaches over the picture's edge, as an arm
+    does: a lamp that swings there is smaller than what it swings beside."""
+    _, stats = _things(moves.sum(0) >= SOMETIMES)
+    if not len(stats):
+        return False
+    x, y, width, height, area = max(stats.tolist(), key=lambda thing: thing[4])
+    at_edge = min(x, y) <= EDGE or max(x + width, y + height) >= SMALL - EDGE
+    return bool(area >= LARGE * SMALL**2 and at_edge)
 
 
-def _two_arms(moves):
-    """Whether two things that move (84, 84) come in over the edge, one beside the other."""
-    closed = cv2.morphologyEx(moves.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((9, 9), np.uint8))
-    _, _, stats, _ = cv2.connectedComponentsWithStats(closed)
-    spans = sorted(
-        (x, x + width)
-        for x, y, width, height, area in stats[1:].tolist()
-        if area >= LARGE * moves.size
-        and (min(x, y) <= EDGE or max(x + width, y + height) >= SMALL - EDGE)
-    )
-    return any(b[0] - a[1] >= APART * SMALL for a, b in pairwise(spans))
+def _doors(moves):
+    """The outermost places (T, 2) at which large things that move (T, 84, 84) come in over the
+    left, right and upper edge, 0 to 1 from left to right; nan where none does."""
+    out = np.full((len(moves), 2), np.nan)
+    for t, moved in enumerate(moves):
+        labels, stats = _things(moved)
+        large = 1 + np.flatnonzero(stats[:, 4] >= LARGE * SMALL**2)
+        inside = np.isin(labels, large)
+        x = np.flatnonzero(inside[:EDGE].any(0)).tolist()
+        x += [0] * bool(inside[:, :EDGE].any()) + [SMALL - 1] * bool(inside[:, -EDGE:].any())
+        if x:
+            out[t] = min(x) / (SMALL - 1), max(x) / (SMALL - 1)
+    return out
+
+
+def _things(mask):
+    """Labels (84, 84) of what hangs together in a mask but for gaps of less than 9 pixels, and its
+    x, y, width, height and area, (n, 5)."""
+    closed = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((9, 9), np.uint8))
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(closed)
+    return labels, stats[1:]

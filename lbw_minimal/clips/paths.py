@@ -43,6 +43,7 @@ class Tracks:
     object_sure: np.ndarray  # (T,)
     side: int  # pixels, the shorter side of the frames
     cuts: tuple[int, ...] = ()  # frames at which the picture changes all at once
+    enters: float = np.nan  # where the arm comes in, 0 at the left edge, 1 at the right
 
     def part(self, first: int, last: int) -> Tracks:
         """Frames `first` to `last` - 1."""
@@ -69,7 +70,7 @@ class Tracks:
 
 
 def longest_piece(tracks: Tracks, touched: bool, notes: list[str]) -> Tracks:
-    """The piece between cuts in which most happens, from where the hand is first to last seen.
+    """The piece between cuts in which most happens, from where the hand is first seen.
 
     A cut is a frame at which the picture changes all at once, and tip or object jump. Most happens
     where the object goes farthest, or the tip where nothing is touched.
@@ -78,11 +79,11 @@ def longest_piece(tracks: Tracks, touched: bool, notes: list[str]) -> Tracks:
     pieces = []
     for first, last in zip([0, *cuts], [*cuts, len(tracks.times)], strict=True):
         seen = first + np.flatnonzero(tracks.tip_sure[first:last] >= SURE)
-        if len(seen) and seen[-1] + 1 - seen[0] >= LEAST_FRAMES:
-            pieces.append(tracks.part(seen[0], seen[-1] + 1))
+        if len(seen) and last - seen[0] >= LEAST_FRAMES:
+            pieces.append(tracks.part(seen[0], last))  # a hit thing goes on without the hand
     if not pieces:
         if (tracks.tip_sure >= SURE).mean() < TIP_FOUND:
-            raise _no_arm(tracks)
+            raise _no_tip(tracks)
         raise Unusable(
             f"{len(tracks.times)} frames are too few, even without cuts {LEAST_FRAMES} are needed",
             "film the whole motion in one go, at 10 frames a second or more",
@@ -113,10 +114,10 @@ def _extent(tracks, name):
     return np.linalg.norm(np.ptp(median3(points), axis=0)) if len(points) else 0.0
 
 
-def _no_arm(tracks):
+def _no_tip(tracks):
     share = (tracks.tip_sure >= SURE).mean()
     return Unusable(
-        f"no arm is seen in most of the clip, a hand's tip in {share:.0%} of it",
+        f"the tip of the hand is seen in {share:.0%} of the clip, and hidden or out of it else",
         SIDE_ON,
     )
 
@@ -125,7 +126,7 @@ def trusted(tracks: Tracks, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Times and points (n, 2) of the frames in which the tip or the object is surely found."""
     sure = getattr(tracks, f"{name}_sure") >= SURE
     if sure.mean() < TIP_FOUND and name == "tip":
-        raise _no_arm(tracks)
+        raise _no_tip(tracks)
     if sure.mean() < FOUND and name == "object":
         raise Unusable(
             f"the object is seen in {sure.mean():.0%} of the frames, and hidden or too small else",

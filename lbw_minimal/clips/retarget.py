@@ -28,17 +28,17 @@ from lbw_minimal.clips.paths import (
     progress,
     trusted,
 )
+from lbw_minimal.clips.pushing import check_way, gets_faster
 
 FPS = 25  # steps a second of the motion, as in the tasks
 CONTACT = 0.12  # of the object's way: by then it is pushed, whatever the tip's pixels say
 ARRIVED = 0.99  # of its way
 APPROACH = 0.6  # s, from the arm's start to where the clip's hand comes into reach
 RUN_UP = 2.0  # s before a hit that are kept
+LITTLE = 0.1  # of the picture's shorter side: what goes less far and is broken off was not done
 LONGEST = 12.0  # s, the longest horizon of the tasks; only a hit cannot be hurried
 STEEP = 1.0  # height over width of the way; steeper, and it is not seen from the side
 UNSEEN = 0.4  # s, longer than a glitch of the detector
-LIFTED = 0.35  # of its way: what leaves the straight line by more was picked up
-AHEAD = 0.25  # of its way: a tip so far in front of the object does not push it
 CARRIED = 0.85  # of its way: a hand that goes along so far has not hit
 OUTSIDE = 0.02  # m out of the tip's box; until then the approach stands in for the clip
 TOO_FAST = 1.5  # times what it may ask for: slowed down by more is worth a warning
@@ -96,7 +96,16 @@ def lay(tracks: Tracks, scene: Scene, mirror: bool | None = None) -> Motion:
         gap = float(np.diff(seen).max())
         if gap > UNSEEN:
             warnings.append(f"The object is not seen for {gap:.1f} s; an even way was assumed.")
-    start, end = ends(thing, LEAST_WAY * tracks.side, "object" if touched else "hand")
+    what = "object" if touched else "hand"
+    start, end = ends(thing, LEAST_WAY * tracks.side, what)
+    if gets_faster(thing):
+        way = float(np.linalg.norm(end - start))
+        if way < LITTLE * tracks.side:
+            raise Unusable(
+                f"the clip ends {way:.0f} pixels on its way, while the {what} still gets faster",
+                "film on until all is done and rests",
+            )
+        warnings.append(f"The clip ends while the {what} still gets faster: was it not done yet?")
     if mirror is None:
         mirror = bool(end[0] < start[0])
         if mirror:
@@ -105,7 +114,7 @@ def lay(tracks: Tracks, scene: Scene, mirror: bool | None = None) -> Motion:
     x, way = apply(A, tip), progress(thing, start, end)  # (N, 2) m, (N,) from 0 to 1
     i, j = (int(np.argmax(way >= share)) for share in (CONTACT if touched else ARRIVED, ARRIVED))
     if touched:
-        _check_way(tip, thing, way, start, end)
+        check_way(tip, thing, way, (i, j), (start, end), tracks.enters)
         x, object_ = _push(x, way, scene, warnings)
     else:
         object_ = None
@@ -147,26 +156,6 @@ def fit(start: np.ndarray, end: np.ndarray, scene: Scene, mirror: bool) -> np.nd
 def apply(A: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Points (N, 2) under the affine map A (2, 3)."""
     return points @ A[:, :2].T + A[:, 2]
-
-
-def _check_way(tip, thing, way, start, end):
-    """Raise Unusable where the object is pulled or lifted: the scenes' arm can only push."""
-    along = end - start
-    length = np.linalg.norm(along)
-    ahead = (tip - start) @ along / length**2 - way  # (N,) of the way; the tip pushes from behind
-    i, j = int(np.argmax(way >= CONTACT)), int(np.argmax(way >= ARRIVED))
-    came = np.median(ahead[: max(1, i // 2)]) > AHEAD and ahead[i] > -RESTS
-    if came or np.median(ahead[i : j + 1]) > AHEAD:
-        raise Unusable(
-            "the object comes towards the arm, or the hand is in front of it",
-            "push it away from the arm, with the hand behind it",
-        )
-    aside = (thing[: j + 1] - start) @ (np.array([-along[1], along[0]]) / length**2)
-    if np.abs(aside).max() > LIFTED:
-        raise Unusable(
-            f"the object leaves its straight way by {np.abs(aside).max():.0%} of its length",
-            "push it straight along the table, without lifting it",
-        )
 
 
 def _push(x, way, scene, warnings):

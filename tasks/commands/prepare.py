@@ -220,7 +220,7 @@ def follow(result: Prepared, choices: Choices) -> Motion:
     found = look(frames, clip.cuts)
     tracks = Tracks(
         clip.times, found.tip, found.object, found.tip_sure, found.object_sure,
-        min(height, width), tuple(clip.cuts),
+        min(height, width), tuple(clip.cuts), footage.enters(frames, clip.cuts),
     )  # fmt: skip
     tracks = tracks.marked("tip", list(choices.tip)).marked("object", list(choices.object))
     result.tracks = tracks

@@ -1,0 +1,75 @@
+"""Whether the paths of tip and object in a clip are those of a push, as the scenes' arm can do it.
+
+In: paths in pixels, 25 times a second. A push is told by what holds for any camera: the object goes
+away from the arm, it is reached before it goes, the hand stays behind it, and the table is level.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from lbw_minimal.clips.paths import RESTS, Unusable
+
+LIFTED = 0.35  # of its way: what leaves the straight line by more was picked up
+AHEAD = 0.25  # of its way: a tip so far in front of the object does not push it
+SIDEWAYS = 0.25  # of the width: an arm that comes in farther inside comes from above
+GLUED = 0.25  # of its way: a hand that comes to an object comes nearer by more
+COMES_DOWN = 0.25  # of its way: a table and a camera are not so far out of level
+STRIDE = 4  # steps, over which a speed is taken
+FASTEST = 0.95  # of the highest speed: the rest is noise
+
+
+def check_way(
+    tip: np.ndarray,
+    thing: np.ndarray,
+    way: np.ndarray,
+    steps: tuple[int, int],
+    ends: tuple[np.ndarray, np.ndarray],
+    enters: float,
+) -> None:
+    """Raise Unusable where the object is not pushed: the scenes' arm can only push.
+
+    tip, thing (N, 2) pixels; way (N,): how much of its way the object has gone, 0 to 1; steps: when
+    it is touched, and there; ends: where its way begins and ends; enters: where the arm comes in, 0
+    at the picture's left edge, 1 at its right, nan if unknown.
+    """
+    (i, j), (start, end) = steps, ends
+    along = end - start
+    length = np.linalg.norm(along)
+    from_left, from_right = enters < SIDEWAYS, enters > 1 - SIDEWAYS
+    if (from_left and along[0] < 0) or (from_right and along[0] > 0):
+        raise Unusable(
+            "the object comes towards the arm, which so pulls it",
+            "push it away from the arm, with the hand behind it",
+        )
+    apart = np.linalg.norm(np.ptp((tip - thing)[: j + 1], axis=0))
+    if apart < GLUED * length and along[1] > COMES_DOWN * length:
+        raise Unusable(
+            "the object never moves: what goes with the hand from the start, and comes down with "
+            "it, is the hand",
+            "film the task being done, with an object that is seen before the hand gets to it",
+        )
+    ahead = (tip - start) @ along / length**2 - way  # (N,) of the way; the tip pushes from behind
+    came = np.median(ahead[: max(1, i // 2)]) > AHEAD and ahead[i] > -RESTS
+    if came or np.median(ahead[i : j + 1]) > AHEAD:
+        if from_left or from_right:  # and the object goes away from there
+            raise Unusable(
+                "the arm is between the object and the camera, and hides it",
+                "push it from behind, with the hand between it and the edge of the picture",
+            )
+        raise Unusable(
+            "the object comes towards the arm, or the hand is in front of it",
+            "push it away from the arm, with the hand behind it",
+        )
+    aside = (thing[: j + 1] - start) @ (np.array([-along[1], along[0]]) / length**2)
+    if np.abs(aside).max() > LIFTED:
+        raise Unusable(
+            f"the object leaves its straight way by {np.abs(aside).max():.0%} of its length",
+            "push it straight along the table, without lifting it",
+        )
+
+
+def gets_faster(path: np.ndarray) -> bool:
+    """Whether a path (N, 2) ends at its highest speed, as one does that is broken off."""
+    steps = np.linalg.norm(path[STRIDE:] - path[:-STRIDE], axis=1)
+    return bool(len(steps) and steps[-1] > FASTEST * steps.max())
