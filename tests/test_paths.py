@@ -46,11 +46,13 @@ def test_the_piece_is_taken_in_which_most_happens_to_what_matters():
     assert longest_piece(cut, False, []).times[-1] == 19 / 25
 
 
-def test_a_piece_begins_where_the_hand_is_seen_and_goes_on_without_it():
+@pytest.mark.parametrize(("touched", "last"), [(False, 25), (True, 27)])
+def test_a_piece_ends_where_the_hand_or_what_it_touched_is_last_seen(touched, last):
     sure = np.ones(30)
     sure[:5], sure[10:12], sure[-4:] = 0.4, 0.4, 0.4
-    piece = longest_piece(tracks(np.arange(30), sure=sure), False, [])
-    assert (piece.times[0], piece.times[-1]) == (5 / 25, 29 / 25)
+    hit = np.where(np.arange(30) < 28, 1.0, 0.4)  # it goes on by itself for two frames
+    piece = longest_piece(replace(tracks(np.arange(30), sure=sure), object_sure=hit), touched, [])
+    assert (piece.times[0], piece.times[-1]) == (5 / 25, last / 25)
 
 
 @pytest.mark.parametrize(("jump", "is_cut"), [(3, False), (5, True)])

@@ -70,7 +70,8 @@ class Tracks:
 
 
 def longest_piece(tracks: Tracks, touched: bool, notes: list[str]) -> Tracks:
-    """The piece between cuts in which most happens, from where the hand is first seen.
+    """The piece between cuts in which most happens, from where the hand is first seen to where
+    hand or object is last seen.
 
     A cut is a frame at which the picture changes all at once, and tip or object jump. Most happens
     where the object goes farthest, or the tip where nothing is touched.
@@ -79,8 +80,12 @@ def longest_piece(tracks: Tracks, touched: bool, notes: list[str]) -> Tracks:
     pieces = []
     for first, last in zip([0, *cuts], [*cuts, len(tracks.times)], strict=True):
         seen = first + np.flatnonzero(tracks.tip_sure[first:last] >= SURE)
-        if len(seen) and last - seen[0] >= LEAST_FRAMES:
-            pieces.append(tracks.part(seen[0], last))  # a hit thing goes on without the hand
+        if not len(seen):
+            continue
+        there = first + np.flatnonzero(tracks.object_sure[first:last] >= SURE)
+        end = 1 + (max(seen[-1], there[-1]) if touched and len(there) else seen[-1])
+        if end - seen[0] >= LEAST_FRAMES:
+            pieces.append(tracks.part(seen[0], end))  # a hit thing goes on without the hand
     if not pieces:
         if (tracks.tip_sure >= SURE).mean() < TIP_FOUND:
             raise _no_tip(tracks)

@@ -99,10 +99,10 @@ def lay(tracks: Tracks, scene: Scene, mirror: bool | None = None) -> Motion:
     what = "object" if touched else "hand"
     start, end = ends(thing, LEAST_WAY * tracks.side, what)
     if gets_faster(thing):
-        way = float(np.linalg.norm(end - start))
-        if way < LITTLE * tracks.side:
+        gone = float(np.linalg.norm(end - start))
+        if gone < LITTLE * tracks.side:
             raise Unusable(
-                f"the clip ends {way:.0f} pixels on its way, while the {what} still gets faster",
+                f"the clip ends {gone:.0f} pixels on its way, while the {what} still gets faster",
                 "film on until all is done and rests",
             )
         warnings.append(f"The clip ends while the {what} still gets faster: was it not done yet?")
