@@ -99,6 +99,17 @@ def test_enough_frames_have_to_be_sure_and_only_those_count():
         trusted(tracks(x, sure=sure), "tip")
 
 
+@pytest.mark.parametrize(
+    ("rests", "reason"), [(12, "never moves"), (8, "seen in 0% of the frames")]
+)
+def test_an_object_that_is_suspected_at_one_place_never_moves(rests, reason):
+    """In more than half of 20 frames it is within 4 of 100 pixels of where it mostly is."""
+    x = np.r_[50 + 3.0 * (np.arange(rests) % 2), 90 - 5 * np.arange(20 - rests)]
+    unsure = replace(tracks(x), object_sure=np.full(20, 0.2))
+    with pytest.raises(Unusable, match=reason):
+        trusted(unsure, "object")
+
+
 def test_the_median_of_three_takes_out_a_glitch_and_keeps_a_step_and_the_ends():
     x = np.array([5.0, 0, 0, 9, 0, 4, 4, 4, 7])
     points = np.stack([x, -x], 1)

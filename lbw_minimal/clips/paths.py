@@ -22,6 +22,7 @@ LEAST_FRAMES = 8  # of a piece: 0.3 s of a phone's, 0.8 s of a slow webcam's
 LEAST_WAY = 0.04  # of the picture's shorter side: a detector errs by 0.01
 JUMP = 0.04  # of the same, from one frame to the next, where the picture changes at once as well
 SIDE_ON = "film from the side, so that arm and hand come in from the left or right edge, uncovered"
+NEARER = "film the task being done, so near that it goes across a quarter of the picture"
 RESTS = 0.05  # of the fastest speed; what is slower rests
 
 
@@ -133,6 +134,9 @@ def trusted(tracks: Tracks, name: str) -> tuple[np.ndarray, np.ndarray]:
     if sure.mean() < TIP_FOUND and name == "tip":
         raise _no_tip(tracks)
     if sure.mean() < FOUND and name == "object":
+        away = np.linalg.norm(tracks.object - np.median(tracks.object, axis=0), axis=1)
+        if (away < LEAST_WAY * tracks.side).mean() > FOUND:  # unsure, and still the same place
+            raise Unusable("the object never moves, what may be it stands at one place", NEARER)
         raise Unusable(
             f"the object is seen in {sure.mean():.0%} of the frames, and hidden or too small else",
             "push it from behind, with the hand between it and the edge of the picture, and film "
@@ -183,10 +187,7 @@ def ends(path: np.ndarray, least: float, what: str) -> tuple[np.ndarray, np.ndar
     away = np.linalg.norm(path - path[0], axis=1)
     far = int(np.argmax(away))
     if away[far] < least:
-        raise Unusable(
-            f"the {what} never moves, or by {away[far]:.0f} pixels only",
-            "film the task being done, so near that it goes across a quarter of the picture",
-        )
+        raise Unusable(f"the {what} never moves, or by {away[far]:.0f} pixels only", NEARER)
     moving = int(np.argmax(away > 2 * RESTS * away[far]))
     there = np.linalg.norm(path - path[far], axis=1) < RESTS * away[far]
     return np.median(path[:moving], axis=0), np.median(path[there], axis=0)
