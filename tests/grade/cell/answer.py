@@ -47,8 +47,8 @@ class Hidden:
 
 def own_lines(name: str) -> str:
     return (
-        f"{name} is not here while an exercise is checked: it is answered by your own lines, with "
-        "its numbers written as numbers"
+        f"{name} is not here while an exercise is checked: answer with your own lines, and write "
+        "numbers as numbers"
     )
 
 
