@@ -52,6 +52,10 @@ def sees(play):
     won = [sum(play(camera, 1.0) for _ in range(15)) for camera in ("open", "grey")]
     return won[0] - won[1] > 4
 """,
+    11: """
+def trick(t):
+    return (1, 0, -0.33) if t < 6 else (0, 0, 0)
+""",
     12: """
 def mend(times, found):
     wide = np.pad(found, ((2, 2), (0, 0)), mode="edge")
