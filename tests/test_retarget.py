@@ -318,6 +318,11 @@ def test_a_hand_and_an_object_that_go_along_a_level_table_together_are_both_ther
     lay(seen(push(t), t), SCENE)
 
 
+def test_a_way_that_comes_down_is_laid_where_the_hand_came_to_the_object():
+    """The camera leans by 20 degrees."""
+    lay(clip(camera=CAMERA + np.array([[0, 0, 0], [320.0, 0, 0]])), SCENE)
+
+
 @pytest.mark.parametrize(("last", "faster"), [(1.5, True), (1.8, False), (2.3, False)])
 def test_a_clip_that_breaks_off_while_the_object_gets_faster_is_warned_of(last, faster):
     """Half of the way is gone at 1.5 s, where the object is fastest."""
