@@ -108,6 +108,9 @@ def test_an_object_that_is_suspected_at_one_place_never_moves(rests, reason):
     unsure = replace(tracks(x), object_sure=np.full(20, 0.2))
     with pytest.raises(Unusable, match=reason):
         trusted(unsure, "object")
+    seen = replace(unsure, object_sure=np.r_[np.full(18, 0.2), 0.9, 0.9])  # surely elsewhere
+    with pytest.raises(Unusable, match="seen in 10% of the frames"):
+        trusted(seen, "object")
 
 
 def test_the_median_of_three_takes_out_a_glitch_and_keeps_a_step_and_the_ends():

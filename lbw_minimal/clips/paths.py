@@ -18,6 +18,7 @@ SURE = 0.5  # a point found with less is as good as not found
 FOUND = 0.5  # share of the frames in which the object has to be found
 # The same of the tip: while it rests it is like its clip's median, and told from that by little.
 TIP_FOUND = 0.15
+ELSEWHERE = 0.05  # of the frames: in more of them a thing at rest is not surely seen elsewhere
 LEAST_FRAMES = 8  # of a piece: 0.3 s of a phone's, 0.8 s of a slow webcam's
 LEAST_WAY = 0.04  # of the picture's shorter side: a detector errs by 0.01
 JUMP = 0.04  # of the same, from one frame to the next, where the picture changes at once as well
@@ -135,7 +136,8 @@ def trusted(tracks: Tracks, name: str) -> tuple[np.ndarray, np.ndarray]:
         raise _no_tip(tracks)
     if sure.mean() < FOUND and name == "object":
         away = np.linalg.norm(tracks.object - np.median(tracks.object, axis=0), axis=1)
-        if (away < LEAST_WAY * tracks.side).mean() > FOUND:  # unsure, and still the same place
+        rests = away < LEAST_WAY * tracks.side  # (N,) unsure, and still the same place
+        if rests.mean() > FOUND and (sure & ~rests).mean() < ELSEWHERE:
             raise Unusable("the object never moves, what may be it stands at one place", NEARER)
         raise Unusable(
             f"the object is seen in {sure.mean():.0%} of the frames, and hidden or too small else",
