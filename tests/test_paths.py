@@ -148,6 +148,8 @@ def test_start_and_end_of_a_way_are_medians_of_its_rests():
     np.testing.assert_allclose(start, [10, 40], atol=4)
     np.testing.assert_allclose(end, [110, 40], atol=0.5)
     assert start[0] < 16
+    path[0] += 2  # where it is found first is no better than the next
+    np.testing.assert_allclose(ends(path, 4.0, "object")[0], [10, 40], atol=0.5)
 
 
 def test_what_goes_less_than_asked_never_moves():
