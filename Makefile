@@ -35,7 +35,7 @@ cluster: $(VENV)/ready
 	$(PIP) -q -r requirements-cluster.txt
 	$(BIN)/python -m pytest -q tests/test_cluster.py
 
-# Faults put in on purpose, one at a time, 500 of them: hours; --count 60 takes the first of them.
+# Faults put in on purpose, one at a time, 500 of them: an hour or two; --count 60 takes the first.
 mutants: $(VENV)/ready
 	$(PIP) -q -r requirements-mutants.txt
 	$(BIN)/python -m tests.mutants

@@ -109,6 +109,8 @@ def test_what_is_odd_about_a_video_is_said_and_its_frames_are_taken(tmp_path, mo
     )
     assert job.read_video(tmp_path, whole=True) is film and asked == [(tmp_path, True)]
     assert capsys.readouterr().err == "warning: it is dark.\nwarning: it jumps.\n"
+    job.read_video(tmp_path)  # the longest piece between cuts, unless all of it is asked for
+    assert asked[1] == (tmp_path, False)
 
 
 @pytest.mark.parametrize(

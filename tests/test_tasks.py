@@ -133,7 +133,7 @@ def test_starts_are_drawn_from_as_far_as_the_jitter_says(id):
         assert off[:, i].min() < least < 0.01 < off[:, i].max(), f"column {i}"
     assert np.abs(np.corrcoef(off[:, columns].T) - np.eye(len(columns))).max() < 0.4
     assert off[:, 1] == pytest.approx(np.zeros(60), abs=1e-5)
-    # Along y, which the camera hardly tells, an object is moved by half as much, and a drawer never.
+    # Along y, which the camera hardly tells, an object is moved by half as much; a drawer never.
     deep = np.abs(off[:, 4]).max()
     assert 0.009 < deep < 0.0101 if 3 in columns and "Drawer" not in id else deep < 1e-5
 
