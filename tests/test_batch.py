@@ -117,7 +117,7 @@ def test_what_is_missing_is_printed_in_its_order_and_the_order_said(tmp_path, ca
     out, said = capsys.readouterr()
     lines = out.splitlines()
     assert len(lines) == 10 and lines[0] == (
-        f"python -m tasks reach --seed 0 --threads 1 --out {tmp_path}/reach-0 --episodes 3 "
+        f"python -m tasks reach --seed 0 --threads 1 --out {tmp_path / 'reach-0'} --episodes 3 "
         "--from-scratch"
     )
     assert all("--from-scratch" in line for line in lines[:5])

@@ -17,7 +17,7 @@ def told(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
 
     def train(iterations, seed, checkpoint):
-        told.append((iterations, seed, str(checkpoint.path)))
+        told.append((iterations, seed, checkpoint.path.as_posix()))
         checkpoint.path.write_text("cut off here")
         return SimpleNamespace(save=lambda path: path.write_text("weights")), ["row"]
 

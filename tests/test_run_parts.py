@@ -228,7 +228,7 @@ def test_the_robots_experts_are_kept_where_no_run_looks(tmp_path, monkeypatch, c
         record.video, "write", lambda path, film, fps: written.update({path.name: (film, fps)})
     )
     monkeypatch.setattr(
-        record, "save_recordings", lambda path, all_: written.update({str(path): all_})
+        record, "save_recordings", lambda path, all_: written.update({path.as_posix(): all_})
     )
     record.main(["push", "--robot"])
     assert asked == [("push", 0.005)]
