@@ -44,6 +44,7 @@ from cosmic_ray.operators import (
 from cosmic_ray.operators.operator import Operator
 
 from lbw_minimal.report import wilson
+from lbw_minimal.training import write_atomic
 from tests.by_line import Lines, measure
 
 ROOT = Path(__file__).parent.parent
@@ -326,9 +327,8 @@ def main() -> None:
             finally:
                 trees.put(tree)
             rows.append(row)
-            args.out.write_text(
-                json.dumps(sorted(rows, key=lambda r: (r["file"], r["line"])), indent=1)
-            )
+            ordered = sorted(rows, key=lambda r: (r["file"], r["line"]))
+            write_atomic(args.out, json.dumps(ordered, indent=1))
             word = "noticed " if row["noticed"] else "SURVIVED"
             print(
                 f"{len(rows)}/{len(wanted)} {word} {row['file']}:{row['line']} {row['after']}",
