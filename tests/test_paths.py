@@ -146,7 +146,7 @@ def test_start_and_end_of_a_way_are_medians_of_its_rests():
     path = np.stack([x, np.full(len(x), 40.0)], 1) + rng.normal(0, 0.3, (len(x), 2))
     start, end = ends(path, 4.0, "object")
     np.testing.assert_allclose(start, [10, 40], atol=4)
-    np.testing.assert_allclose(end, [110, 40], atol=0.5)
+    np.testing.assert_allclose(end, [110, 40], atol=0.2)
     assert start[0] < 16
     path[0] += 2  # where it is found first is no better than the next
     np.testing.assert_allclose(ends(path, 4.0, "object")[0], [10, 40], atol=0.5)

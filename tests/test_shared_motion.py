@@ -109,3 +109,19 @@ def test_what_a_steadied_camera_sees_no_more_stays_as_it_was():
     black = camera.steadied(np.stack([frames[0], 0 * frames[0]]), shift[:2])[1]
     np.testing.assert_array_equal(black[:, :29], frames[0][:, :29])
     assert not black[:, 31:].any()
+
+
+def test_a_corner_is_lost_that_comes_back_more_than_seven_tenths_of_a_pixel_off(monkeypatch):
+    """And it is looked for by 21 pixels about it, first where the motion so far would take it."""
+    asked = []
+
+    def found_again(one, two, corners, guess, home, window, most):
+        asked.append((guess[0, 0].tolist(), home is corners, window, most))
+        return corners + 1, np.array([True, False])
+
+    monkeypatch.setattr(camera, "found_again", found_again)
+    corners = np.array([[[10.0, 20.0]], [[30.0, 40.0]]], np.float32)
+    here, there = camera._followed(None, None, corners, BEFORE)
+    assert asked == [([3.0, 20.0], True, (21, 21), 0.7)]
+    assert here.tolist() == [[10, 20]] and there.tolist() == [[11, 21]]
+    assert [len(found) for found in camera._followed(None, None, corners[:0], BEFORE)] == [0, 0]
