@@ -338,7 +338,9 @@ def main() -> None:
         with ThreadPoolExecutor(args.jobs) as pool:
             list(pool.map(meet, [m for m in wanted if m not in done]))
         while not trees.empty():
-            trees.get().warm.stdin.close()
+            warm = trees.get().warm
+            warm.stdin.close()
+            warm.wait()  # or its folder would be gone before it has begun
     noticed = sum(row["noticed"] for row in rows)
     low, high = wilson(noticed, len(rows))
     print(f"{noticed} of {len(rows)} noticed, {100 * low:.1f} to {100 * high:.1f} % (Wilson, 95 %)")
