@@ -13,7 +13,7 @@ from tests.strangers import FAULTS, Stranger, judged, stranger, trial
 
 DEVELOPED = 2  # the seed with which prepare was mended
 HELD_BACK, COUNT = 21, 36
-RIGHT = 0.65  # measured: 26 of 36; the goal is 0.95
+RIGHT = 0.75  # measured: 30 of 36; the goal is 0.95
 
 
 @pytest.mark.parametrize(
