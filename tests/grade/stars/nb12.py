@@ -24,11 +24,9 @@ def clip(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Times (T,) in s, not even; the hand's places (T, 2) in pixels, and where it was found."""
     times = np.cumsum(rng.choice([1, 1, 1, 2], 90) / 30)
     corners = rng.uniform(15, SIZE - 15, (4, 2))
-    ends = np.sort(rng.uniform(times[0], times[-1], 6)).reshape(
-        3, 2
-    )  # of each way; it rests between
+    ways = np.sort(rng.uniform(times[0], times[-1], 6)).reshape(3, 2)  # it rests between them
     truth = np.tile(corners[0], (len(times), 1))
-    for (start, end), a, b in zip(ends, corners[:-1], corners[1:], strict=True):
+    for (start, end), a, b in zip(ways, corners[:-1], corners[1:], strict=True):
         s = np.clip((times - start) / max(end - start, 0.3), 0, 1)[:, None]
         truth += (10 * s**3 - 15 * s**4 + 6 * s**5) * (b - a)
     found = truth + rng.normal(0, NOISE, truth.shape)
