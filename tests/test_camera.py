@@ -1,4 +1,4 @@
-"""Whether the camera moves: told by the room's corners, and never by the arm's."""
+"""Whether the camera moves: told by the room, and never by the arm."""
 
 import cv2
 import numpy as np
@@ -50,7 +50,7 @@ def test_what_trembles_stands_still_when_it_is_steadied():
 
 @pytest.mark.parametrize("furnished", [True, False])
 def test_an_arm_is_no_camera_even_where_the_room_has_nothing_else(furnished):
-    """In a bare room all corners are the arm's: nothing tells that the camera moves."""
+    """In a bare room all edges are the arm's: nothing tells that the camera moves."""
     picture = room(H, W) if furnished else np.full((H, W, 3), 120, np.uint8)
     frames = arm(np.linspace(0.1, 0.7, T), picture)
     frames[:, H // 2 : 2 * H // 3 : 6] //= 2  # a striped sleeve

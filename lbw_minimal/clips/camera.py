@@ -1,10 +1,12 @@
-"""How the camera moved while a clip was filmed, from the corners that stand in the room.
+"""How the camera moved while a clip was filmed, from all that stands in the room.
 
 In: frames (T, H, W, 3) uint8 of one shot. Out: for each frame the similarity that takes its pixels
 to those of the first, and how far that leads: 0 for a camera on a stand. A pan, a zoom and a hand
-that trembles move the whole picture by one similarity; an arm moves its own part. So corners are
-followed from frame to frame, and the motion counts that is shared all over the picture. Where the
-room is so bare that nothing tells, the camera is taken to stand.
+that trembles move the whole picture by one similarity; an arm moves its own part. So each frame is
+laid over the first by Gauss-Newton steps (Lucas and Kanade 1981), and pixels that do not fit weigh
+little (Geman and McClure 1987). Corners alone would not do: stripes, tiles and bare walls have few
+of them, or many that look alike, but each edge tells how it moved across itself. Where the room is
+so bare that nothing tells, the camera is taken to stand.
 """
 
 from __future__ import annotations
@@ -12,36 +14,33 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from lbw_minimal.clips.corners import found_again
-
-LOOK_AT = 60  # frames that are followed, spread over the shot; between them it is interpolated
-CELLS = 12  # of the longer side: a cell has one vote, or a striped sleeve would outvote the room
-WINDOW = (21, 21)  # pixels, what is compared about a corner
-SMOOTH = 1.5  # pixels: corners of noise are no corners
-BACK = 0.7  # pixels: a corner that comes back further off is lost
-FITS = 1.0  # pixels off, and still the same motion; also that of a corner that stands
-LEAST = 5  # cells that have to agree
-WIDE = 0.2  # of the picture, about which these have to lie
-FEW = 0.5  # times the cells that move: so many that stand are chance, dust or a caption
-FRESH = 0.5  # of a frame's corners: when fewer are left, others are chosen
+LOOK_AT = 120  # frames that are looked at, spread over the shot; between them it is interpolated
+COARSE, FINE = 60, 200  # pixels of the longer side: the first finds the way, the second the place
+SMOOTH, LOCAL = 1.0, 15  # pixels: noise is taken off, and the local mean, with light and exposure
+STEPS = 20  # at most; most frames take three to six
+DONE = 0.03  # pixels: a step that is shorter is the last
+NOISE = 2.0  # grey levels, the least that a pixel is taken to vary by
+DAMPED = 0.5  # the weight, in pixels of noise, with which a step stays short where nothing tells
+CELLS = 12  # along the longer side: a cell has one vote, or a striped sleeve would outvote the room
+BETTER = 0.1  # of what a pixel can be off, in a cell's mean: by so much a cell votes
+MOST = 1.0  # times the votes for a camera that stands: what is less is an arm's
+WIDE = 0.2  # of the picture, about which the cells have to lie that vote for one that moves
 
 
 def sway(frames: np.ndarray) -> np.ndarray:
     """Similarities (T, 2, 3) from the pixels of each frame (T, H, W, 3) uint8 to those of the
     first."""
     every = np.unique(np.linspace(0, len(frames) - 1, LOOK_AT).round().astype(int))
-    grey = [_plain(frames[t]) for t in every]
-    at, base, step = [np.eye(3)], np.eye(3), np.eye(3)
-    one, corners = grey[0], _corners(grey[0])
-    for two in grey[1:]:
-        here, there = _followed(one, two, corners, step)
-        step = _shared(here, there, one.shape, step)
-        at.append(base @ step)
-        if len(here) < FRESH * len(corners):
-            one, corners, base, step = two, _corners(two), at[-1], np.eye(3)
-    flat = np.stack(at)[:, :2].reshape(-1, 6)
+    coarse, fine = (_Picture(frames[0], side) for side in (COARSE, FINE))
+    there, at, votes = np.eye(3), [], []
+    for t in every:
+        there = fine.laid(frames[t], coarse.laid(frames[t], there))
+        at.append(np.linalg.inv(there)[:2].ravel())
+        votes.append(fine.votes(frames[t], there))
+    if _stands(np.array(votes)):
+        return np.repeat(np.eye(3)[None, :2], len(frames), axis=0)
     along = np.arange(len(frames))
-    return np.stack([np.interp(along, every, one) for one in flat.T], 1).reshape(-1, 2, 3)
+    return np.stack([np.interp(along, every, one) for one in np.array(at).T], 1).reshape(-1, 2, 3)
 
 
 def extent(sways: np.ndarray, height: int, width: int) -> float:
@@ -64,45 +63,94 @@ def steadied(frames: np.ndarray, sways: np.ndarray) -> np.ndarray:
     return out
 
 
-def _plain(frame):
-    """A frame (H, W, 3) in grey (H, W) uint8, without its local mean: light and exposure change."""
-    grey = cv2.GaussianBlur(cv2.cvtColor(frame, cv2.COLOR_RGB2GRAY), (0, 0), SMOOTH).astype(float)
-    return np.clip(128 + 3 * (grey - cv2.blur(grey, (31, 31))), 0, 255).astype(np.uint8)
+class _Picture:
+    """A first frame, over which others are laid. Its places count from the picture's middle."""
+
+    def __init__(self, frame: np.ndarray, side: int):
+        h, w = frame.shape[:2]
+        scale = min(1.0, side / max(h, w))
+        self.size = round(w * scale), round(h * scale)
+        self.plain = _plain(frame, self.size)
+        x, y = np.meshgrid(*(np.arange(n, dtype=np.float32) - n / 2 for n in self.size))
+        self.reach = max(self.size) / 2  # pixels: a turn or a zoom by 1 would move the edge so far
+        gx, gy = (
+            cv2.Sobel(self.plain, cv2.CV_32F, *along, ksize=3, scale=1 / 8)
+            for along in ((1, 0), (0, 1))
+        )
+        # How a pixel changes if what is seen is zoomed, turned and shifted: (h w, 4)
+        self.slopes = np.stack(
+            [(gx * x + gy * y) / self.reach, (gy * x - gx * y) / self.reach, gx, gy], axis=-1
+        ).reshape(-1, 4)
+        middle = np.array([[1, 0, self.size[0] / 2], [0, 1, self.size[1] / 2], [0, 0, 1]])
+        self.middle = middle, np.linalg.inv(middle)
+        self.scale = np.diag([self.size[0] / w, self.size[1] / h, 1.0])
+
+    def laid(self, frame: np.ndarray, there: np.ndarray) -> np.ndarray:
+        """The similarity (3, 3) from this picture's pixels, at full size, to those of a frame.
+
+        there: where to begin.
+        """
+        plain = _plain(frame, self.size)
+        at = self.scale @ there @ np.linalg.inv(self.scale)
+        for _ in range(STEPS):
+            off, inside = self._off(plain, at)
+            noise = _noise(off, inside)
+            weights = (inside / (1 + (off / noise) ** 2) ** 2).reshape(-1)
+            weighted = self.slopes * weights[:, None]
+            normal = self.slopes.T @ weighted + DAMPED * noise**2 * np.eye(4)
+            zoom, turn, dx, dy = step = np.linalg.solve(normal, weighted.T @ off.reshape(-1))
+            zoom, turn = zoom / self.reach, turn / self.reach
+            moved = np.array([[1 + zoom, -turn, dx], [turn, 1 + zoom, dy], [0, 0, 1]])
+            at = at @ np.linalg.inv(self.middle[0] @ moved @ self.middle[1])
+            if np.abs(step).max() < DONE:
+                break
+        return np.linalg.inv(self.scale) @ at @ self.scale
+
+    def votes(self, frame: np.ndarray, there: np.ndarray) -> np.ndarray:
+        """For each cell (h, w) of this picture: 1 if it is more like the frame moved by `there`,
+        -1 if it is more like the frame as it stands, 0 if it does not tell."""
+        plain = _plain(frame, self.size)
+        at = self.scale @ there @ np.linalg.inv(self.scale)
+        moves, stands = (self._off(plain, one) for one in (at, np.eye(3)))
+        noise, cell = _noise(*moves), max(self.size) / CELLS
+        cells = tuple(max(1, round(n / cell)) for n in self.size)
+        moves, stands = (
+            cv2.resize(_unlike(*one, noise), cells, interpolation=cv2.INTER_AREA)
+            for one in (moves, stands)
+        )
+        better = stands - moves
+        return np.sign(better) * (np.abs(better) > BETTER)
+
+    def _off(self, plain, at):
+        """How far a frame (h, w) is off this picture at each pixel, and which it shows, (h, w)."""
+        how = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        shown = cv2.warpAffine(plain, at[:2], self.size, flags=how)
+        inside = cv2.warpAffine(np.ones_like(plain), at[:2], self.size, flags=how) > 0.99
+        return shown - self.plain, inside
 
 
-def _corners(grey):
-    """The corners (n, 1, 2) of a frame (H, W) uint8."""
-    found = cv2.goodFeaturesToTrack(grey, 400, 0.01, max(grey.shape) / 50, blockSize=7)
-    return np.zeros((0, 1, 2), np.float32) if found is None else found
+def _stands(votes):
+    """Whether the cells (T, h, w) of a shot say that the camera stands, or nothing."""
+    moved = votes > 0
+    if moved.sum() <= MOST * (votes < 0).sum():
+        return True
+    spread = np.argwhere(moved.any(0)).astype(np.float32)
+    return bool(cv2.contourArea(cv2.convexHull(spread)) < WIDE * moved[0].size)
 
 
-def _followed(one, two, corners, step):
-    """The corners (n, 2) of the first frame that are found in the second, and where there.
-
-    step: the similarity (3, 3) from the second to the first, as it was a moment ago.
-    """
-    if not len(corners):
-        return corners[:, 0], corners[:, 0]
-    guess = cv2.transform(corners, np.linalg.inv(step)[:2]).astype(np.float32)
-    there, kept = found_again(one, two, corners, guess, corners, WINDOW, BACK)
-    return corners[kept, 0], there[kept, 0]
+def _plain(frame, size):
+    """A frame in grey, as large as `size` (w, h), without noise and without its local mean."""
+    grey = cv2.cvtColor(cv2.resize(frame, size, interpolation=cv2.INTER_AREA), cv2.COLOR_RGB2GRAY)
+    grey = cv2.GaussianBlur(grey.astype(np.float32), (0, 0), SMOOTH)
+    return grey - cv2.blur(grey, (LOCAL, LOCAL))
 
 
-def _shared(here, there, shape, before):
-    """The similarity (3, 3) that most of the picture shares from `there` to `here`, (n, 2); the
-    one before where nothing tells."""
-    if len(here) < LEAST:
-        return before
-    fit, _ = cv2.estimateAffinePartial2D(there, here, method=cv2.RANSAC, ransacReprojThreshold=FITS)
-    if fit is None:
-        return before
-    cells = (here // (max(shape) / CELLS)).astype(int) @ (CELLS, 1)
-    fits = np.linalg.norm(there @ fit[:, :2].T + fit[:, 2] - here, axis=1) < FITS
-    stands = np.linalg.norm(there - here, axis=1) < FITS
-    moved, still = (len(np.unique(cells[what])) for what in (fits, stands))
-    if still >= max(LEAST, FEW * moved):
-        return np.eye(3)
-    hull = cv2.contourArea(cv2.convexHull(here[fits].astype(np.float32)))
-    if moved < LEAST or hull < WIDE * shape[0] * shape[1]:
-        return before
-    return np.vstack([fit, (0, 0, 1)])
+def _noise(off, inside):
+    """The deviation that most pixels have, in grey levels."""
+    return max(NOISE, 1.4826 * float(np.median(np.abs(off[inside])))) if inside.any() else NOISE
+
+
+def _unlike(off, inside, noise):
+    """How unlike the pixels (h, w) are, 0 to 1; what is not shown is neither nor."""
+    q = (off / noise) ** 2
+    return np.where(inside, q / (1 + q), 0.5).astype(np.float32)

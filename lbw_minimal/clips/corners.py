@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import warnings
 from itertools import pairwise
-from typing import Any
 
 import cv2
 import numpy as np
@@ -24,27 +23,14 @@ NEAR, LIKE = 12.0, 1.5
 CORNERS = 3  # fewer give no median
 
 
-def found_again(
-    one: np.ndarray,
-    two: np.ndarray,
-    corners: np.ndarray,
-    guess: np.ndarray,
-    home: np.ndarray | None,
-    window: tuple[int, int],
-    most: float,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Where the corners (n, 1, 2), n >= 1, of a grey frame are in another, and which come back.
-
-    guess, home (n, 1, 2): where to look first, there and on the way back; home None: where they
-    have come to. A corner that comes back more than `most` pixels off is lost. Returns (n, 1, 2)
-    and (n,) bool.
-    """
-    how: dict[str, Any] = {"winSize": window, "flags": cv2.OPTFLOW_USE_INITIAL_FLOW}
-    there, ok, _ = cv2.calcOpticalFlowPyrLK(one, two, corners, guess.copy(), **how)
-    home = there if home is None else home
-    back, ok_back, _ = cv2.calcOpticalFlowPyrLK(two, one, there, home.copy(), **how)
+def _found_again(one, two, corners):
+    """Where the corners (n, 1, 2), n >= 1, of a grey frame are in another, and which (n,) bool come
+    back when they are followed backwards."""
+    how = {"winSize": WINDOW, "flags": cv2.OPTFLOW_USE_INITIAL_FLOW}
+    there, ok, _ = cv2.calcOpticalFlowPyrLK(one, two, corners, corners.copy(), **how)
+    back, ok_back, _ = cv2.calcOpticalFlowPyrLK(two, one, there, there.copy(), **how)
     kept = (np.hstack([ok, ok_back]) > 0).all(1)
-    return there, kept & (np.linalg.norm(back - corners, axis=2)[:, 0] < most)
+    return there, kept & (np.linalg.norm(back - corners, axis=2)[:, 0] < BACK)
 
 
 def follow(grey: np.ndarray) -> np.ndarray:
@@ -59,7 +45,7 @@ def follow(grey: np.ndarray) -> np.ndarray:
     for one, two in pairwise(grey):
         path = np.full_like(paths[0], np.nan)
         if len(alive):
-            there, kept = found_again(one, two, here, here, None, WINDOW, BACK)
+            there, kept = _found_again(one, two, here)
             alive, here = alive[kept], there[kept]
             path[alive] = here[:, 0]
         paths.append(path)
