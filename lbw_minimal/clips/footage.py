@@ -19,18 +19,20 @@ from lbw_minimal.clips.paths import LEAST_FRAMES, SIDE_ON, Unusable
 
 # Of the longer side: the way of the picture's corners. Below the first a camera stands, above the
 # second near and far things move apart, and no fit undoes it.
-TREMBLES, MOVES = 0.005, 0.09
+TREMBLES, MOVES = 0.005, 0.11
 LARGE = 0.015  # of the picture: less that moves is no arm
 EDGE = 3  # pixels from the picture's edge, over which an arm comes in
 FAINT = 10  # grey levels: at the shoulder an arm moves by little
 SOMETIMES = 2  # frames in which something moves: noise does so in one
 APART = 0.7  # of the width: one arm never comes in at places so far apart
-OFTEN = 0.1  # of the frames: an arm at its median place is not told from the room
+OFTEN = 0.05  # of the frames: an arm at its median place is not told from the room
 
 
-def check(frames: np.ndarray, cuts: Sequence[int] = ()) -> tuple[np.ndarray, list[str]]:
-    """The frames, steadied where the camera trembles, and warnings about them.
+def check(frames: np.ndarray, cuts: Sequence[int] = ()) -> tuple[np.ndarray, list[str], float]:
+    """The frames, steadied where the camera trembles, warnings about them, and where the arm comes
+    in: 0 at the picture's left edge, 1 at its right.
 
+    The latter is nan if it cannot be told: at its median place an arm looks like the room.
     cuts: frames with which a new shot begins; the longest one is asked, and all are steadied.
     Raises Unusable if the shot has few frames, if nothing moves in it, if the camera moves, or if
     two arms do the moving.
@@ -42,40 +44,37 @@ def check(frames: np.ndarray, cuts: Sequence[int] = ()) -> tuple[np.ndarray, lis
             f"{last - first} frames in one go are too few, at least {LEAST_FRAMES} are needed",
             "film the whole motion in one go, at 10 frames a second or more",
         )
-    if not before_background(frames[first:last])[2]:
+    still, background, moving = before_background(frames[first:last])
+    if not moving:
         raise Unusable("nothing moves in the clip", "film an arm that does the task")
-    sways = [camera.sway(frames[a:b]) for a, b in shots]
-    way = camera.extent(sways[shots.index((first, last))], *frames.shape[1:3])
-    if way > MOVES:
-        raise Unusable(
-            "the camera moves", "put it on a stand or lean it against something, and film again"
-        )
-    warnings = []
-    if way > TREMBLES:
-        steady = [camera.steadied(frames[a:b], s) for (a, b), s in zip(shots, sways, strict=True)]
-        frames = np.concatenate(steady)
-        warnings.append("The camera trembles, and the picture was steadied; a stand would help.")
-    still, background, _ = before_background(frames[first:last])
-    if not _comes_in(np.abs(still - background) > FAINT):
+    frames, warnings = _steadied(frames, shots, shots.index((first, last)))
+    if warnings:
+        still, background, _ = before_background(frames[first:last])
+    off = np.abs(still - background)
+    if not _comes_in(off > FAINT):
         raise Unusable("no arm is seen, nothing large that moves comes in from the edge", SIDE_ON)
-    doors = _doors(np.abs(still - background) > MOVED)
+    doors = _doors(off > MOVED)
     if (np.nan_to_num(np.ptp(doors, axis=1)) >= APART).mean() > OFTEN:
         raise Unusable(
             "arms come in over opposite edges of the picture, as of several people",
             "film one arm, and let nothing else move near the edges",
         )
-    return frames, warnings
+    return frames, warnings, float(np.nanmean(doors)) if np.isfinite(doors).any() else np.nan
 
 
-def enters(frames: np.ndarray, cuts: Sequence[int] = ()) -> float:
-    """Where the arm comes into the longest shot, 0 at the picture's left edge, 1 at its right.
-
-    nan if that cannot be told: at its median place an arm looks like the room.
-    """
-    first, last = max(pairwise([0, *cuts, len(frames)]), key=lambda shot: shot[1] - shot[0])
-    still, background, _ = before_background(frames[first:last])
-    doors = _doors(np.abs(still - background) > MOVED)
-    return float(np.nanmean(doors)) if np.isfinite(doors).any() else np.nan
+def _steadied(frames, shots, longest):
+    """The frames, steadied if the camera trembles in the longest shot, and a warning then."""
+    sways = [camera.sway(frames[first:last]) for first, last in shots]
+    way = camera.extent(sways[longest], *frames.shape[1:3])
+    if way > MOVES:
+        raise Unusable(
+            "the camera moves", "put it on a stand or lean it against something, and film again"
+        )
+    if way <= TREMBLES:
+        return frames, []
+    steady = [camera.steadied(frames[a:b], s) for (a, b), s in zip(shots, sways, strict=True)]
+    warning = "The camera trembles, and the picture was steadied; a stand would help."
+    return np.concatenate(steady), [warning]
 
 
 def _comes_in(moves):

@@ -215,12 +215,12 @@ def follow(result: Prepared, choices: Choices) -> Motion:
                 f"{clip.times[0]:.1f} to {clip.times[-1]:.1f} s",
                 "click into a frame of the page: it writes the place in the picture as it was read",
             )
-    frames, warnings = footage.check(frames, clip.cuts)
+    frames, warnings, enters = footage.check(frames, clip.cuts)
     result.clip, result.warnings = replace(clip, frames=frames), result.warnings + warnings
     found = look(frames, clip.cuts)
     tracks = Tracks(
         clip.times, found.tip, found.object, found.tip_sure, found.object_sure,
-        min(height, width), tuple(clip.cuts), footage.enters(frames, clip.cuts),
+        min(height, width), tuple(clip.cuts), enters,
     )  # fmt: skip
     tracks = tracks.marked("tip", list(choices.tip)).marked("object", list(choices.object))
     result.tracks = tracks
