@@ -20,6 +20,7 @@ BACK = 0.5  # pixels: a corner that comes back further off is lost
 # In 84ths of the longer side: how far from the object's middle its corners are, and how much
 # unlike its path theirs may be.
 NEAR, LIKE = 12.0, 1.5
+FARTHER = 2.0  # times the object's way, while it is found: what goes farther is another's
 CORNERS = 3  # fewer give no median
 
 
@@ -63,13 +64,20 @@ def objects_own(paths: np.ndarray, path: np.ndarray, unit: float) -> tuple[np.nd
         offset = path[:, None] - paths  # (T, n, 2)
         middle = np.nanmedian(offset, axis=0)
         unlike = np.nanmedian(np.abs(offset - middle).sum(2), axis=0)
-        moved = (np.nanmax(paths, axis=0) - np.nanmin(paths, axis=0)).max(1)
-    way = (np.nanmax(path, axis=0) - np.nanmin(path, axis=0)).max()
+        moved = _extent(paths)
+        # The tip of a hand that has come to rest beside a thing is as like it most of the time.
+        farther = _extent(paths + 0 * path[:, None]) > FARTHER * (_extent(path) + unit)
+    way = _extent(path)
     seen = np.isfinite(offset[..., 0]).sum(0) >= 3
     near = np.abs(middle).max(1) < NEAR * unit
     # Half of an object's way, and a corner of the background would be as like it.
     moves = moved > max(2 * unit, way / 4)
-    return seen & near & moves & (unlike < LIKE * unit), middle
+    return seen & near & moves & ~farther & (unlike < LIKE * unit), middle
+
+
+def _extent(paths):
+    """How far paths (T, ..., 2) go along x or y, (...,); nan does not count."""
+    return (np.nanmax(paths, axis=0) - np.nanmin(paths, axis=0)).max(-1)
 
 
 def followed(frames: np.ndarray, path: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -10,7 +10,9 @@ frames from their left and upper edge; `refine` then follows the object by its o
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
 import cv2
@@ -108,10 +110,16 @@ class Detector:
         return Detector(network)
 
 
-def refine(frames: np.ndarray, found: Found) -> Found:
-    """Found, with the object's places as its own corners moved, where these can be followed."""
+def refine(frames: np.ndarray, found: Found, cuts: Sequence[int] = ()) -> Found:
+    """Found, with the object's places as its own corners moved, where these can be followed.
+
+    cuts: frames with which a new shot begins, over which nothing is followed.
+    """
     sure = found.object_sure
-    path, known = followed(frames, np.where(sure[:, None] > SURE, found.object, np.nan))
+    path = np.where(sure[:, None] > SURE, found.object, np.nan)
+    shots = [slice(*shot) for shot in pairwise([0, *cuts, len(frames)])]
+    parts = [followed(frames[shot], path[shot]) for shot in shots]
+    path, known = (np.concatenate(part) for part in zip(*parts, strict=True))
     level = np.median(sure[known & (sure > SURE)]) if known.any() else 0
     return replace(
         found,

@@ -234,7 +234,8 @@ def follow(result: Prepared, choices: Choices) -> Motion:
 
 def look(frames: np.ndarray, cuts: Sequence[int] = ()) -> Found:
     """Tip and object in a clip's frames, as the shipped detector sees them and patches agree."""
-    return refine(frames, mended(frames, Detector.load(EYES).detect(frames), cuts))
+    found = mended(frames, Detector.load(EYES).detect(frames), cuts)
+    return refine(frames, found, cuts)
 
 
 def is_own(clip: Clip, first: np.ndarray) -> bool:
