@@ -175,14 +175,14 @@ def painted(rng, task, kind, h, w, rate):
     else:
         tip[:, 0] += way * move
     thing = thing + np.stack([way * share, 0 * share], 1)
-    tip, thing = _spoilt(rng, kind, tip, thing, u, way, move, table)
+    tip, thing = _spoilt(rng, task, kind, tip, thing, u, way, move)
     before = u * np.array([-d * rng.uniform(0.15, 0.5), -rng.uniform(0.1, 0.35)])
     after = u * np.array([-d * rng.uniform(0.1, 0.3), -rng.uniform(0.05, 0.25)])
     tip = tip + (1 - near[:, None]) * before + back[:, None] * after
     return _pictures(rng, task, kind, (h, w), (tip, thing, half, u, d, way, table)), tip, thing
 
 
-def _spoilt(rng, kind, tip, thing, u, way, move, table):
+def _spoilt(rng, task, kind, tip, thing, u, way, move):
     """Paths with what makes the clip one of its kind."""
     if kind in ("never moves", "still"):
         hover = np.array([0, -rng.uniform(0.0, 0.12) * u])
@@ -197,8 +197,9 @@ def _spoilt(rng, kind, tip, thing, u, way, move, table):
     elif kind == "lifted":
         bow = 4 * (move * (1 - move))[:, None] * (0, -rng.uniform(0.7, 1.0) * abs(way))
         tip, thing = tip + bow, thing + bow
-    elif kind == "steep":
-        up = np.array([[0.25, 0], [-0.9 * np.sign(way), 1]])  # across becomes up
+    elif kind == "steep":  # across becomes up; a hand that reaches comes down, or it would not be
+        lean = 0.9 * np.sign(way) * (1 if task == "reach" else -1)  # in the picture at first
+        up = np.array([[0.25, 0], [lean, 1]])
         tip, thing = ((p - thing[0]) @ up.T + thing[0] + (0, 0.1 * u) for p in (tip, thing))
     return tip, thing
 

@@ -524,6 +524,18 @@ def test_corners_take_the_noise_off_the_objects_path(cut):
     assert np.array_equal(refined.tip, found.tip)
 
 
+def test_no_corner_is_followed_over_a_cut():
+    """The wall's corners stand all along; but before the cut they lie by a pan elsewhere."""
+    frames, _, found = slides()
+    before = np.roll(frames[:1], 6, axis=2).repeat(10, axis=0)
+    sure = np.concatenate([np.zeros(10, np.float32), found.object_sure])
+    places = np.concatenate([found.object[:1].repeat(10, axis=0), found.object])
+    refined = refine(np.concatenate([before, frames]), Found(places, places, sure, sure), [10])
+    alone = refine(frames, found)
+    np.testing.assert_array_equal(refined.object[10:], alone.object)
+    assert not refined.object_sure[:10].any()
+
+
 def test_an_object_that_is_not_found_is_not_followed():
     frames, _, found = slides()
     nowhere = Found(found.tip, found.object, found.tip_sure, 0 * found.object_sure)
@@ -585,6 +597,16 @@ def test_a_corner_is_the_objects_if_it_goes_a_quarter_of_its_way_and_two_pixels(
         path = np.stack([20 + far * (np.arange(9) == 8), np.full(9, 50.0)], 1)
         corner = np.stack([20 + goes * (np.arange(9) == 8), np.full(9, 53.0)], 1)
         assert own(corner, path) == is_own, (far, goes)
+
+
+@pytest.mark.parametrize(("goes", "is_own"), [(9.5, True), (10.5, False)])
+def test_what_goes_twice_as_far_as_the_object_and_two_pixels_is_not_its_own(goes, is_own):
+    """A tip that comes and rests beside a thing that stirs by 4 is like it most of the time."""
+    path = np.stack([20 + 4.0 * (np.arange(9) == 8), np.full(9, 50.0)], 1)
+    corner = np.stack([20 - goes * (np.arange(9) == 0), np.full(9, 53.0)], 1)
+    assert own(corner, path) == is_own
+    path[0] = np.nan  # where the object is not seen it may have gone as far
+    assert own(corner, path)
 
 
 def test_a_corner_has_to_be_seen_with_the_object_in_three_frames():

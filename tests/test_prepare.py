@@ -8,6 +8,7 @@ from toy_clips import shows
 
 from lbw_minimal import video
 from lbw_minimal.clips.detector import Found
+from lbw_minimal.clips.footage import Footage
 from lbw_minimal.clips.page import write_page
 from lbw_minimal.clips.paths import Unusable
 from lbw_minimal.clips.reader import Clip, read_clip
@@ -221,7 +222,11 @@ def test_what_was_found_is_laid_by_the_clips_shorter_side_cuts_and_marks(monkeyp
     clip = Clip(np.zeros((n, 90, 160, 3), np.uint8), 2 + np.arange(n) / 20, [4], [])
     nothing = Found(np.zeros((n, 2)), np.zeros((n, 2)), np.zeros(n), np.zeros(n))
     monkeypatch.setattr(prepare, "look", lambda frames, cuts: nothing)
-    monkeypatch.setattr(prepare.footage, "check", lambda frames, cuts: (frames, [f"cut at {cuts}"]))
+    monkeypatch.setattr(
+        prepare.footage,
+        "check",
+        lambda frames, cuts: Footage(frames, [f"cut at {cuts}"], 0.2, True),
+    )
     monkeypatch.setattr(
         prepare,
         "lay",
@@ -233,6 +238,7 @@ def test_what_was_found_is_laid_by_the_clips_shorter_side_cuts_and_marks(monkeyp
     tracks = laid["tracks"]
     assert (tracks.side, tracks.cuts, laid["scene"], laid["mirror"]) == (90, (4,), "scene", True)
     assert tracks.tip[2].tolist() == [10, 20] and tracks.object[2].tolist() == [30, 40]
+    assert (tracks.enters, tracks.unmoved) == (0.2, True)
     assert result.warnings == ["cut at [4]"] and result.tracks is tracks
     assert result.notes[0].startswith("6 frames at 20 a second")
     for wrong in ((161.0, 20.0, 2.1), (10.0, 91.0, 2.1), (10.0, 20.0, 1.9), (10.0, 20.0, 2.3)):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from lbw_minimal.clips.detector import Found
+from lbw_minimal.clips.footage import Footage
 from lbw_minimal.clips.paths import Unusable
 from lbw_minimal.clips.reader import Clip
 from lbw_minimal.training import InputError
@@ -76,8 +77,8 @@ def test_patches_mend_what_the_shipped_detector_finds_and_corners_refine_it(monk
 
     monkeypatch.setattr(prepare, "Detector", SimpleNamespace(load=detector))
     monkeypatch.setattr(prepare, "mended", lambda seen, found, cuts: [*found, cuts, seen is frames])
-    monkeypatch.setattr(prepare, "refine", lambda seen, found: (seen is frames, found))
-    assert prepare.look(frames, [1]) == (True, ["eyes.safetensors", True, [1], True])
+    monkeypatch.setattr(prepare, "refine", lambda seen, found, cuts: (cuts, seen is frames, found))
+    assert prepare.look(frames, [1]) == ([1], True, ["eyes.safetensors", True, [1], True])
 
 
 @pytest.mark.parametrize(
@@ -91,7 +92,9 @@ def test_a_mark_lies_in_the_picture_and_in_the_clips_seconds(mark, inside, monke
     """Six frames of 160x90 from 2 s on; the page rounds, so a hundredth of a second is let pass."""
     nothing = Found(np.zeros((6, 2)), np.zeros((6, 2)), np.zeros(6), np.zeros(6))
     monkeypatch.setattr(prepare, "look", lambda frames, cuts: nothing)
-    monkeypatch.setattr(prepare.footage, "check", lambda frames, cuts: (frames, []))
+    monkeypatch.setattr(
+        prepare.footage, "check", lambda frames, cuts: Footage(frames, [], 0.5, False)
+    )
     monkeypatch.setattr(prepare, "lay", lambda tracks, scene, mirror: "laid")
     for name in ("tip", "object"):
         result, choices = prepared(clip=clip(start=2.0)), Choices(**{name: (mark,)})

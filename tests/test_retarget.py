@@ -7,7 +7,14 @@ import pytest
 from toy_pushes import CAMERA, HIT, SCENE, SIDE, at, clip, hit, jerk, push, seen
 
 from lbw_minimal.clips import retarget
-from lbw_minimal.clips.paths import LEAST_FRAMES, Unusable, low_pass, progress
+from lbw_minimal.clips.paths import (
+    LEAST_FRAMES,
+    Tracks,
+    Unusable,
+    low_pass,
+    of_a_hand,
+    progress,
+)
 from lbw_minimal.clips.retarget import APPROACH, FPS, HURRY, Motion, apply, fit, lay, pace
 
 PUSHING = np.linspace(1.35, 1.9, 20)  # s, after 12 % of the way and before it is done
@@ -177,6 +184,28 @@ def test_a_reach_goes_from_the_arms_start_to_the_mark():
     assert abs(motion.arrival / FPS - 1.3) < 0.2 and motion.object is None
 
 
+@pytest.mark.parametrize(
+    ("tip", "thing", "stands_in"), [(0.1, 0.6, 1), (0.2, 0.6, 0), (0.1, 0.4, 0)]
+)
+def test_in_a_reach_what_moves_is_the_hand_if_no_tip_is_found(tip, thing, stands_in):
+    """A tip in a seventh of the frames is enough, and what moves has to be seen in half of them."""
+    n = 100
+    sure = [np.where(np.arange(n) < n * share, 1.0, 0.0) for share in (tip, thing)]
+    tracks = Tracks(np.arange(n) / 25, np.zeros((n, 2)), np.ones((n, 2)), *sure, side=200)
+    notes = []
+    hand = of_a_hand(tracks, notes)
+    assert hand.tip[0, 0] == stands_in and len(notes) == stands_in
+    assert hand.tip_sure.mean() == (thing if stands_in else tip)
+
+
+@pytest.mark.parametrize(("way", "stands_in"), [(15.0, 0), (25.0, 1)])
+def test_in_a_reach_what_goes_twice_as_far_as_the_tip_is_the_hand(way, stands_in):
+    n = 100
+    tip, thing = (np.linspace((0, 0), (far, 0), n) for far in (10.0, way))
+    tracks = Tracks(np.arange(n) / 25, tip, thing + 1, np.ones(n), np.ones(n), side=200)
+    assert of_a_hand(tracks, []).tip[0, 0] == stands_in
+
+
 def test_a_hand_that_goes_back_after_a_reach_has_stayed_at_the_mark():
     """Half a second there, then home again, which the motion does not do."""
     scene = replace(SCENE, start=(0.46, 0.12), goal=(0.68, 0.06), tip=(0.46, 0.12), contact=None)
@@ -279,6 +308,16 @@ def broken_off():
     return clip(last=1.4), "while the object still gets faster"
 
 
+def lifted_by_a_hand_in_front():
+    """The detector takes a wheel of the toy for the tip; what is lifted is lifted all the same."""
+    tracks = lifted()[0]
+    return replace(tracks, tip=tracks.object + (80, 0), enters=0.2), "leaves its straight"
+
+
+def nothing_stands_elsewhere_in_the_end():
+    return replace(a_hidden_object()[0], unmoved=True), "the object never moves"
+
+
 def the_hand_taken_for_the_object():
     tracks = clip()
     slope = tracks.tip + np.stack([0 * tracks.times, 0.5 * tracks.object[:, 0]], 1)
@@ -293,7 +332,8 @@ def lifted():
 
 NOT_USABLE = (nothing_is_pushed, no_hand, a_hidden_object, too_few_frames, short_pieces, from_above,
               pulled, held_from_the_front, hidden_by_the_arm, drawn_to_the_arm,
-              the_hand_taken_for_the_object, broken_off, lifted)  # fmt: skip
+              the_hand_taken_for_the_object, broken_off, lifted,
+              lifted_by_a_hand_in_front, nothing_stands_elsewhere_in_the_end)  # fmt: skip
 
 
 @pytest.mark.parametrize("fault", NOT_USABLE, ids=lambda f: f.__name__)

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import NamedTuple
 
 import cv2
 import numpy as np
 
 from lbw_minimal.clips import camera
-from lbw_minimal.clips.motion import MOVED, SMALL, before_background
+from lbw_minimal.clips.motion import MOVED, MOVED_SHARE, SMALL, before_background
 from lbw_minimal.clips.paths import LEAST_FRAMES, SIDE_ON, Unusable
 
 # Of the longer side: the way of the picture's corners. Below the first a camera stands, above the
@@ -26,13 +27,21 @@ FAINT = 10  # grey levels: at the shoulder an arm moves by little
 SOMETIMES = 2  # frames in which something moves: noise does so in one
 APART = 0.7  # of the width: one arm never comes in at places so far apart
 OFTEN = 0.05  # of the frames: an arm at its median place is not told from the room
+ENDS = 16  # a clip's first and last frames are so many of it
 
 
-def check(frames: np.ndarray, cuts: Sequence[int] = ()) -> tuple[np.ndarray, list[str], float]:
-    """The frames, steadied where the camera trembles, warnings about them, and where the arm comes
-    in: 0 at the picture's left edge, 1 at its right.
+class Footage(NamedTuple):
+    """What is known of a clip before anything is searched for in it."""
 
-    The latter is nan if it cannot be told: at its median place an arm looks like the room.
+    frames: np.ndarray  # (T, H, W, 3) uint8, steadied where the camera trembles
+    warnings: list[str]
+    enters: float  # where the arm comes in, 0 at the picture's left edge, 1 at its right; or nan
+    unmoved: bool  # whether the last frames look as the first ones, but for what comes in
+
+
+def check(frames: np.ndarray, cuts: Sequence[int] = ()) -> Footage:
+    """The frames as they can be searched, and what the arm does at the picture's edges.
+
     cuts: frames with which a new shot begins; the longest one is asked, and all are steadied.
     Raises Unusable if the shot has few frames, if nothing moves in it, if the camera moves, or if
     two arms do the moving.
@@ -59,7 +68,9 @@ def check(frames: np.ndarray, cuts: Sequence[int] = ()) -> tuple[np.ndarray, lis
             "arms come in over opposite edges of the picture, as of several people",
             "film one arm, and let nothing else move near the edges",
         )
-    return frames, warnings, float(np.nanmean(doors)) if np.isfinite(doors).any() else np.nan
+    # At its median place an arm looks like the room.
+    enters = float(np.nanmean(doors)) if np.isfinite(doors).any() else np.nan
+    return Footage(frames, warnings, enters, _unmoved(still))
 
 
 def _steadied(frames, shots, longest):
@@ -77,15 +88,29 @@ def _steadied(frames, shots, longest):
     return np.concatenate(steady), [warning]
 
 
+def _unmoved(still):
+    """Whether nothing but what comes in over an edge differs between the first and the last of the
+    frames (T, 84, 84)."""
+    few = max(1, len(still) // ENDS)
+    first, last = np.median(still[:few], axis=0), np.median(still[-few:], axis=0)
+    _, stats = _things(np.abs(first - last) > MOVED)
+    return not any(
+        area >= MOVED_SHARE * SMALL**2 and not _at_edge(*box) for *box, area in stats.tolist()
+    )
+
+
 def _comes_in(moves):
     """Whether the largest thing that moves (T, 84, 84) reaches over the picture's edge, as an arm
     does: a lamp that swings there is smaller than what it swings beside."""
     _, stats = _things(moves.sum(0) >= SOMETIMES)
     if not len(stats):
         return False
-    x, y, width, height, area = max(stats.tolist(), key=lambda thing: thing[4])
-    at_edge = min(x, y) <= EDGE or max(x + width, y + height) >= SMALL - EDGE
-    return bool(area >= LARGE * SMALL**2 and at_edge)
+    *box, area = max(stats.tolist(), key=lambda thing: thing[4])
+    return bool(area >= LARGE * SMALL**2 and _at_edge(*box))
+
+
+def _at_edge(x, y, width, height):
+    return min(x, y) <= EDGE or max(x + width, y + height) >= SMALL - EDGE
 
 
 def _doors(moves):

@@ -46,6 +46,7 @@ class Tracks:
     side: int  # pixels, the shorter side of the frames
     cuts: tuple[int, ...] = ()  # frames at which the picture changes all at once
     enters: float = np.nan  # where the arm comes in, 0 at the left edge, 1 at the right
+    unmoved: bool = False  # whether the last frames look as the first ones
 
     def part(self, first: int, last: int) -> Tracks:
         """Frames `first` to `last` - 1."""
@@ -69,6 +70,19 @@ class Tracks:
         off = np.stack([x, y], 1) - interpolate(self.times, path, s)
         path = path + interpolate(s, off, self.times)
         return replace(self, **{name: path, f"{name}_sure": np.ones(len(path))})
+
+
+def of_a_hand(tracks: Tracks, notes: list[str]) -> Tracks:
+    """The tracks of a clip in which nothing is touched: what moves there is the hand.
+
+    So what was taken for an object stands in for a tip that was not found, or hardly moves.
+    """
+    tip, thing = ((sure >= SURE).mean() for sure in (tracks.tip_sure, tracks.object_sure))
+    moves = _extent(tracks, "object") > 2 * _extent(tracks, "tip")
+    if thing < FOUND or (tip >= TIP_FOUND and not moves):
+        return tracks
+    notes.append("The tip was not found; what moves instead was taken for the hand.")
+    return replace(tracks, tip=tracks.object, tip_sure=tracks.object_sure)
 
 
 def longest_piece(tracks: Tracks, touched: bool, notes: list[str]) -> Tracks:
@@ -139,6 +153,10 @@ def trusted(tracks: Tracks, name: str) -> tuple[np.ndarray, np.ndarray]:
         rests = away < LEAST_WAY * tracks.side  # (N,) unsure, and still the same place
         if rests.mean() > FOUND and (sure & ~rests).mean() < ELSEWHERE:
             raise Unusable("the object never moves, what may be it stands at one place", NEARER)
+        if tracks.unmoved:
+            raise Unusable(
+                "the object never moves, in the end all looks as it did at first", NEARER
+            )
         raise Unusable(
             f"the object is seen in {sure.mean():.0%} of the frames, and hidden or too small else",
             "push it from behind, with the hand between it and the edge of the picture, and film "

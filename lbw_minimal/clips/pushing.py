@@ -49,6 +49,12 @@ def check_way(
             "it, is the hand",
             "film the task being done, with an object that is seen before the hand gets to it",
         )
+    aside = (thing[: j + 1] - start) @ (np.array([-along[1], along[0]]) / length**2)
+    if np.abs(aside).max() > LIFTED:
+        raise Unusable(
+            f"the object leaves its straight way by {np.abs(aside).max():.0%} of its length",
+            "push it straight along the table, without lifting it",
+        )
     ahead = (tip - start) @ along / length**2 - way  # (N,) of the way; the tip pushes from behind
     came = np.median(ahead[: max(1, i // 2)]) > AHEAD and ahead[i] > -RESTS
     if came or np.median(ahead[i : j + 1]) > AHEAD:
@@ -60,12 +66,6 @@ def check_way(
         raise Unusable(
             "the object comes towards the arm, or the hand is in front of it",
             "push it away from the arm, with the hand behind it",
-        )
-    aside = (thing[: j + 1] - start) @ (np.array([-along[1], along[0]]) / length**2)
-    if np.abs(aside).max() > LIFTED:
-        raise Unusable(
-            f"the object leaves its straight way by {np.abs(aside).max():.0%} of its length",
-            "push it straight along the table, without lifting it",
         )
 
 

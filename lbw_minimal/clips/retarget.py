@@ -25,6 +25,7 @@ from lbw_minimal.clips.paths import (
     interpolate,
     longest_piece,
     low_pass,
+    of_a_hand,
     progress,
     trusted,
 )
@@ -87,6 +88,8 @@ def lay(tracks: Tracks, scene: Scene, mirror: bool | None = None) -> Motion:
     notes: list[str] = []
     warnings: list[str] = []
     touched = scene.contact is not None
+    if not touched:
+        tracks = of_a_hand(tracks, notes)
     tracks = longest_piece(tracks, touched, notes)
     t = np.arange(tracks.times[0], tracks.times[-1] + 1e-9, 1 / FPS)
     tip = thing = low_pass(*trusted(tracks, "tip"), t)  # (N, 2) pixels

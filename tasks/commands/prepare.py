@@ -215,12 +215,13 @@ def follow(result: Prepared, choices: Choices) -> Motion:
                 f"{clip.times[0]:.1f} to {clip.times[-1]:.1f} s",
                 "click into a frame of the page: it writes the place in the picture as it was read",
             )
-    frames, warnings, enters = footage.check(frames, clip.cuts)
-    result.clip, result.warnings = replace(clip, frames=frames), result.warnings + warnings
+    seen = footage.check(frames, clip.cuts)
+    frames = seen.frames
+    result.clip, result.warnings = replace(clip, frames=frames), result.warnings + seen.warnings
     found = look(frames, clip.cuts)
     tracks = Tracks(
         clip.times, found.tip, found.object, found.tip_sure, found.object_sure,
-        min(height, width), tuple(clip.cuts), enters,
+        min(height, width), tuple(clip.cuts), seen.enters, seen.unmoved,
     )  # fmt: skip
     tracks = tracks.marked("tip", list(choices.tip)).marked("object", list(choices.object))
     result.tracks = tracks
