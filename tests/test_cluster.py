@@ -24,6 +24,7 @@ from tests.grade.files import File
 
 ROOT = Path(__file__).resolve().parents[1]
 SOLVED = json.loads((ROOT / "solutions" / "06_reward.ipynb").read_text())
+BARREN = cluster.LEAN / "rfc3987_syntax" / "__init__.py"
 # A run of a second. It notes who runs it, goes on where another stopped, and its wins depend on the
 # perception it was given.
 TOY = """
@@ -70,9 +71,10 @@ def nodes(monkeypatch):
     from ray.cluster_utils import Cluster
 
     monkeypatch.setenv("RAY_USAGE_STATS_ENABLED", "0")
-    here = Cluster(initialize_head=True, head_node_args={"num_cpus": 0})
-    for _ in range(2):
-        here.add_node(num_cpus=1, memory=4 << 30, object_store_memory=100 << 20)
+    with cluster.on_path(cluster.LEAN):
+        here = Cluster(initialize_head=True, head_node_args={"num_cpus": 0})
+        for _ in range(2):
+            here.add_node(num_cpus=1, memory=4 << 30, object_store_memory=100 << 20)
     monkeypatch.setenv("RAY_ADDRESS", here.address)
     yield ray
     ray.shutdown()
@@ -134,6 +136,44 @@ def test_a_line_of_print_is_a_command_of_the_kit(tmp_path, capsys):
     assert len(lines) == 12
     assert all(line.startswith("python -m tasks ") for line in lines)
     assert [line for line in lines if "--from-scratch" in line] == lines[:2]
+
+
+# What Ray's processes load
+
+
+@pytest.fixture
+def look():
+    """For a node: where the kit is, whence the library is taken that slows Ray's processes down,
+    and whether its grammar has been built."""
+
+    def found():
+        import importlib.util
+        import sys
+
+        from tasks.commands import cluster
+
+        library = importlib.util.find_spec("rfc3987_syntax")
+        return cluster.ROOT, Path(library.origin), "lark" in sys.modules
+
+    return found
+
+
+def test_a_local_cluster_finds_the_kit_where_it_is_and_builds_no_grammar(look, monkeypatch):
+    pytest.importorskip("ray", reason="needs Ray: make cluster")
+    monkeypatch.delenv("RAY_ADDRESS", raising=False)
+    monkeypatch.setenv("PYTHONPATH", "elsewhere")
+    try:
+        ((_, found),) = cluster.spread(look, [(0, (), 1 << 20)])
+    finally:
+        cluster.leave()
+    assert found == (ROOT, BARREN, False)
+    assert os.environ["PYTHONPATH"] == "elsewhere" and str(cluster.LEAN) not in sys.path
+
+
+def test_a_cluster_that_runs_gets_the_kit_and_builds_no_grammar(nodes, look):
+    ((_, (place, library, grammar)),) = cluster.spread(look, [(0, (), 1 << 20)])
+    assert place != ROOT and library != BARREN and not grammar
+    assert library.read_text() == BARREN.read_text()
 
 
 # Runs
@@ -316,6 +356,7 @@ def test_grades_of_a_cluster_are_those_of_one_machine(nodes, tmp_path, monkeypat
         for out in (tmp_path / "alone", tmp_path / "there")
     )
     assert len(alone) == 3 + 5 + 6 * 3 and alone == there  # of the class, its reports, and each
+    assert not nodes.is_initialized()  # it has left
     monkeypatch.setattr(cluster, "spread", lambda *_: pytest.fail("it is graded again"))
     assert grade([*every, str(tmp_path / "there"), "--ray"]) == 0
     hand_in(folder, gus=SOLVED)

@@ -7,6 +7,7 @@ Python with requirements.txt and requirements-cluster.txt installed.
 
 from __future__ import annotations
 
+import contextlib
 import os
 import subprocess
 import sys
@@ -19,6 +20,7 @@ from lbw_minimal.training import InputError
 
 ROOT = Path(__file__).resolve().parents[2]
 SHIPPED = ("lbw_minimal", "notebooks", "solutions", "tasks", "tests")  # of the kit: 25 MB
+LEAN = Path(__file__).with_name("lean")  # for the path of Ray's processes: see what lies there
 RETRIES = 3  # new starts of a job whose worker or node was lost
 # Python that dies with its parent (prctl 1, PR_SET_PDEATHSIG): nobody would end it on a lost node.
 MORTAL = (
@@ -37,23 +39,46 @@ def connect() -> Any:
 
     Raises InputError without Ray.
     """
+    sys.path.insert(0, str(LEAN))
     try:
         import ray
     except ImportError:
         raise InputError(
             "--ray: Ray is not installed; pip install -r requirements-cluster.txt does it."
         ) from None
+    finally:
+        sys.path.remove(str(LEAN))
     if not ray.is_initialized():
         os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
         os.environ.setdefault("RAY_OVERRIDE_RUNTIME_ENV_DEFAULT_EXCLUDES", "")  # ours say it all
         others = [f"/{path.name}" for path in ROOT.iterdir() if path.name not in SHIPPED]
-        options: dict[str, Any] = {"logging_level": "warning"}
-        options["runtime_env"] = {"working_dir": str(ROOT), "excludes": others}
+        kit: dict[str, Any] = {"working_dir": str(ROOT), "excludes": others}
+        kit["py_modules"] = [str(LEAN / "rfc3987_syntax")]
         try:
-            ray.init(address="auto", **options)
+            ray.init(address="auto", runtime_env=kit, logging_level="warning")
         except ConnectionError:
-            ray.init(address="local", include_dashboard=False, **options)
+            with on_path(LEAN, ROOT):  # a local one finds the kit where it is
+                ray.init(address="local", include_dashboard=False, logging_level="warning")
     return ray
+
+
+@contextlib.contextmanager
+def on_path(*folders: Path) -> Iterator[None]:
+    """Folders that Python programs started in this block look into first."""
+    before = os.environ.get("PYTHONPATH")
+    path = [*map(str, folders), *filter(None, [before])]
+    os.environ["PYTHONPATH"] = os.pathsep.join(path)
+    try:
+        yield
+    finally:
+        del os.environ["PYTHONPATH"]
+        os.environ |= {"PYTHONPATH": before} if before else {}
+
+
+def leave() -> None:
+    """Disconnect, if this process is connected, and end a local cluster, which takes a second."""
+    if ray := sys.modules.get("ray"):
+        ray.shutdown()
 
 
 def spread(function: Callable, jobs: Iterable[tuple[Any, tuple, int]]) -> Iterator[tuple[Any, Any]]:

@@ -24,15 +24,14 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict
 from pathlib import Path
 
-import torch
-
 from lbw_minimal.training import InputError, write_atomic
+from tasks.commands.cluster import leave
 from tests.grade import feedback, sandbox
 from tests.grade.exercise import Exercise, everything
 from tests.grade.files import File, in_order, printable
 from tests.grade.gradescope import as_results
 from tests.grade.handed_in import Submission, submissions, wanted
-from tests.grade.judge import UNDONE, Result, best, judge, nothing
+from tests.grade.judge import UNDONE, Result, best, judge, nothing, settle
 from tests.grade.reports import reports
 from tests.grade.sandbox import Lost, Sandbox
 from tests.grade.sheets import sheet
@@ -65,11 +64,11 @@ def main(argv=None) -> int:
             return 2
         if lacks := sandbox.warning():
             say(f"warning: {lacks}", sys.stderr)
+        settle()
     if entries[0].paths[0][0] == args.folder:
         say(f"{args.folder} is graded as one submission")
     if chosen:
         say(chosen)
-    torch.set_num_threads(1)
     try:
         grades = _grade_all(args, entries, ids)
     except InputError as e:
@@ -78,18 +77,27 @@ def main(argv=None) -> int:
     except KeyboardInterrupt:
         say("interrupted; the same command goes on where this one was", sys.stderr)
         return 130
+    with ThreadPoolExecutor(1) as aside:  # to end Ray takes as long as to write the reports
+        if args.ray:
+            aside.submit(leave)
+        written = _written(args.out, entries, grades, ids)
+    return 0 if written and not any("failed" in g for g in grades) else 1
+
+
+def _written(out: Path, entries: list[Submission], grades: list[dict], ids: list[str]) -> bool:
+    """Write what is said of the class as a whole. Returns whether all of it is there."""
     written = [
-        keep(args.out / "class.csv", table(grades, ids)),
-        keep(args.out / "junit.xml", feedback.junit(grades)),
+        keep(out / "class.csv", table(grades, ids)),
+        keep(out / "junit.xml", feedback.junit(grades)),
     ]
     if not written[0]:
         say(table(grades, ids))
     try:
-        written += [keep(args.out / name, data) for name, data in reports(entries, grades, ids)]
+        written += [keep(out / name, data) for name, data in reports(entries, grades, ids)]
     except Exception as e:  # a fault in a report costs no grade
         say(f"{traceback.format_exc()}the reports: NOT WRITTEN, {type(e).__name__}", sys.stderr)
         written.append(False)
-    return 0 if all(written) and not any("failed" in g for g in grades) else 1
+    return all(written)
 
 
 def noted_seed(out: Path, given: int | None) -> int:

@@ -7,12 +7,10 @@ import functools
 from collections.abc import Iterator
 from pathlib import Path
 
-import torch
-
 from tasks.commands import cluster
 from tests.grade import sandbox
 from tests.grade.files import File
-from tests.grade.judge import Result
+from tests.grade.judge import Result, settle
 
 MEMORY = 1 << 30  # bytes a submission is given: the judge and the sandbox
 
@@ -31,7 +29,7 @@ def grade_here(
 
     if why := (strict and sandbox.bubblewrap()[1]) or _failing():
         raise cluster.Refused(f"it does not grade, {why}")
-    torch.set_num_threads(1)
+    settle()
     try:
         results, more = grade(files, ids, seed, _box())
     except BaseException:  # the next submission gets a new one

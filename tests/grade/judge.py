@@ -7,6 +7,7 @@ else's (`call`): the notebook calls its own function, the grader a process it do
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import functools
 import threading
 import warnings
@@ -14,17 +15,27 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
+import torch
 
 from tests.grade import example
 from tests.grade.cell.wire import Other, Raised
 from tests.grade.exercise import Check, Exercise, different
-from tests.grade.sandbox import Lost
+from tests.grade.sandbox import KEPT, PIECE, Lost
 
 OPEN = ("NotImplementedError", "StillOpen")  # what an untouched exercise raises
 UNDONE = "not done yet"
 ALONE = threading.RLock()  # torch has one generator of random numbers for all threads
 TRY = "The smallest input that fails, to paste:"
 CHANGES = "it changes its inputs: work on a copy"
+
+
+def settle() -> None:
+    """Make this process a judge's: one thread, and memory that it keeps, as the sandbox does. With
+    memory that comes and goes, PyBullet's worlds take half of the time of `questions`."""
+    torch.set_num_threads(1)
+    mallopt = ctypes.CDLL(None).mallopt
+    mallopt(-3, PIECE)  # M_MMAP_THRESHOLD
+    mallopt(-1, KEPT)  # M_TRIM_THRESHOLD
 
 
 @dataclass

@@ -29,12 +29,14 @@ from tests.grade.exercise import Exercise
 CELL = Path(__file__).resolve().parent / "cell"
 SYSTEM = ("/usr", "/lib", "/lib64", "/bin", "/etc/ld.so.cache", "/etc/alternatives")
 DEVICES = ("/dev/null", "/dev/zero", "/dev/random", "/dev/urandom")
+# bytes: pieces below the first are kept when they are free, up to the second together. A world of
+# PyBullet takes and gives back 30 MB.
+PIECE, KEPT = 32 << 20, 256 << 20
 ENVIRONMENT = {
     "OMP_NUM_THREADS": "1",
-    # Memory of the kind that forks cheaply, and that a process keeps once it has it: a world of
-    # PyBullet takes and gives back 12 MB.
-    "GLIBC_TUNABLES": "glibc.malloc.hugetlb=1:glibc.malloc.mmap_threshold=33554432:"
-    "glibc.malloc.trim_threshold=268435456",
+    # hugetlb: memory of the kind that forks cheaply
+    "GLIBC_TUNABLES": f"glibc.malloc.hugetlb=1:glibc.malloc.mmap_threshold={PIECE}:"
+    f"glibc.malloc.trim_threshold={KEPT}",
 }
 MEMORY = 2 << 30  # bytes a student's code may take
 CPU = 10  # s of processor time for one exercise
