@@ -628,6 +628,23 @@ def test_what_the_judge_works_out_is_worked_out_once_for_a_class(monkeypatch):
     assert len(ran) == 5
 
 
+def test_a_judge_keeps_the_memory_that_it_has_used():
+    """Where the kernel gives it anew each time, there is a fault for each of its 5,120 pages."""
+    code = """if True:
+    from resource import RUSAGE_SELF, getrusage
+    from tests.grade.judge import settle
+    def faults():
+        before = getrusage(RUSAGE_SELF).ru_minflt
+        b"x" * (20 << 20)
+        return getrusage(RUSAGE_SELF).ru_minflt - before
+    settle()
+    print(faults(), faults())
+    """
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
+    first, again = map(int, done.stdout.split())
+    assert first > 5000 and again < 500
+
+
 def test_one_open_case_costs_its_own_checks_only():
     exercise = find("10.4")
     last = "    if not expert.all():"
