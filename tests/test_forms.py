@@ -554,7 +554,8 @@ FORMS = {
         "        ok = int(abs(self.x) < 0.05)\n"
         "        return self.obs, float(ok), False, self.left <= 0, {'is_success': bool(ok)}",
         "class Point(gym.Env):\n    def reset(self, *, seed=None, options=None):\n"
-        "        super().reset(seed=seed)\n        self.path = [self.np_random.uniform(-1, 1)]\n"
+        "        np.random.seed(seed)\n        super().reset(seed=seed)\n"
+        "        self.path = [2 * self.np_random.random() - 1]\n"
         "        return np.array(self.path, np.float32), {}\n    def step(self, action):\n"
         "        self.path.append(self.path[-1] + 0.05 * np.clip(action[0], -1, 1))\n"
         "        x = self.path[-1]\n        return (np.array([x], dtype=np.float32), "

@@ -235,11 +235,40 @@ nullspace.mistake(
     "An environment",
     given=("import gymnasium as gym",),
     probe="""
+    class Edge(np.random.Generator):
+        # Begins where success begins, so that no sum has to come out at that very number.
+        def __init__(self, place):
+            super().__init__(np.random.PCG64(0))
+            self.place = place
+
+        def uniform(self, low=0.0, high=1.0, size=None):
+            return self.place if size is None else np.full(size, self.place)
+
+        def random(self, size=None):
+            return (self.uniform(size=size) + 1) / 2
+
+    def seeded(env, seed):
+        '''reset, and whether its start is drawn from np.random instead of self.np_random.'''
+        shared = np.random.get_state()
+        np.random.seed(0)
+        before = np.random.get_state()
+        start, info = env.reset(seed=seed)
+        after = np.random.get_state()
+        np.random.set_state(shared)
+        drawn = before[2] != after[2] or (before[1] != after[1]).any()
+        right = gym.utils.seeding.np_random(seed)[0].uniform(-1, 1)
+        if drawn and not np.isclose(start, right).all():
+            raise ValueError("the start is drawn from np.random, not from self.np_random")
+        return start, info
+
     def probe(actions, seed, ask):
         env = Point()
         episodes = []
-        for seed in (seed, None) if ask == "two episodes" else (seed,):
-            start, info = env.reset(seed=seed)
+        edge = 0.05 if seed % 2 else -0.05
+        for seed in (seed,) if ask in ("episode", "kind") else (seed, None):
+            if ask == "edge" and seed is None:
+                env.np_random, actions = Edge(edge), 0 * actions
+            start, info = env.reset() if seed is None else seeded(env, seed)
             seen, rows = np.copy(start), []
             for action in actions:
                 rows.append(env.step(action))
@@ -258,7 +287,7 @@ nullspace.mistake(
         if ask == "kind":
             kinds = [f"{x.dtype} of shape {x.shape}" for x in map(np.asarray, (start, *obs))]
             return {"reset": kinds[0], "step": kinds[-1], "place": float(start[0])}
-        return episodes if ask == "two episodes" else episodes[0]
+        return episodes if len(episodes) > 1 else episodes[0]
     """,
 )
 class Point(gym.Env):
@@ -289,11 +318,11 @@ def _far(rng):
 
 
 def _home(rng):
-    """From its start straight to 0, and about it until the 45th step."""
+    """From its start straight to 0, and about it until the 45th step; then at |x| = 0.05."""
     seed = int(rng.integers(1000))
     start = gym.utils.seeding.np_random(seed)[0].uniform(-1, 1)
     steps = np.sign(-start) * np.ones(int(abs(start) / 0.05))
-    return np.append(steps, rng.uniform(-1, 1, 45 - len(steps)))[:, None], seed, "episode"
+    return np.append(steps, rng.uniform(-1, 1, 45 - len(steps)))[:, None], seed, "edge"
 
 
 Point.check("a random walk", _walk)
@@ -370,6 +399,20 @@ Point.mistake(
     "float(done), self.t >= 50, {",
 )
 Point.mistake("Success is |x| < 0.05; your bound is another.", "< 0.05", "< 0.1")
+Point.mistake(
+    "A point that is just 0.05 away from 0 is not there yet: < and not <=.", "< 0.05", "<= 0.05"
+)
+for theirs in (
+    "np.random.uniform(-1, 1), 0",
+    "np.random.seed(seed) or np.random.uniform(-1, 1), 0",
+    "np.random.rand() * 2 - 1, 0",
+):
+    Point.mistake(
+        "You draw the start from np.random, which the whole program shares. The environment has a "
+        "generator of its own, self.np_random, and super().reset(seed=seed) seeds that one.",
+        "self.np_random.uniform(-1, 1), 0",
+        theirs,
+    )
 Point.mistake(
     "Success is judged after the move, where the observation is: yours is judged before it.",
     "        done = abs(self.x) < 0.05\n",

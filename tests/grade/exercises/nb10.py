@@ -127,6 +127,23 @@ wilson.mistake(
     "1.96",
     "1.645",
 )
+for cut in ("max(0.0, centre - half), min(1.0, centre + half)", "centre - half, centre + half"):
+    wilson.mistake(
+        "Your centre is Wilson's and your half width that of Agresti and Coull: under the root "
+        "stand p (1 - p) / n, with the share p itself, and z^2 / (4 n^2).",
+        "z * math.sqrt(p * (1 - p) / n + z**2 / (4 * n**2)) / (1 + z**2 / n)",
+        "z * math.sqrt(centre * (1 - centre) / (n + z**2))",
+        "max(0.0, centre - half), min(1.0, centre + half)",
+        cut,
+    )
+wilson.mistake(
+    "That is the interval with two wins and two losses added; Wilson's has z^2 in its formula, and "
+    "another root.",
+    "(p + z**2 / (2 * n)) / (1 + z**2 / n)",
+    "(wins + 2) / (n + 4)",
+    "z * math.sqrt(p * (1 - p) / n + z**2 / (4 * n**2)) / (1 + z**2 / n)",
+    "z * math.sqrt(centre * (1 - centre) / (n + 4))",
+)
 wilson.mistake(
     "// cuts off what is behind the point: the share of wins is wins / n.",
     "wins / n",
@@ -269,6 +286,19 @@ difference.mistake(
     "float(np.quantile(means, 0.025)), float(np.quantile(means, 0.975))",
     "tuple(float(np.quantile(a[picks_a].mean(1), q) - np.quantile(b[picks_b].mean(1), q)) "
     "for q in (0.025, 0.975))",
+)
+difference.mistake(
+    "You put the low end of a against the high end of b, which holds more than 95 %. Each draw has "
+    "a difference of its own; take quantiles of these.",
+    "float(np.quantile(means, 0.025)), float(np.quantile(means, 0.975))",
+    "tuple(float(np.quantile(a[picks_a].mean(1), q) - np.quantile(b[picks_b].mean(1), 1 - q)) "
+    "for q in (0.025, 0.975))",
+)
+difference.mistake(
+    "That is the basic bootstrap, which mirrors the quantiles about the difference of all: return "
+    "the quantiles of the draws themselves.",
+    "float(np.quantile(means, 0.025)), float(np.quantile(means, 0.975))",
+    "tuple(float(2 * (a.mean() - b.mean()) - np.quantile(means, q)) for q in (0.975, 0.025))",
 )
 difference.mistake(
     "You take quantiles over single seeds: a draw is the mean over its seeds.",

@@ -74,6 +74,18 @@ cyclegan_loss.mistake(
     "(D_x(x_of_y) - 1)",
     "D_x(x_of_y)",
 )
+for theirs in (
+    "F.softplus(-{})",  # of binary_cross_entropy_with_logits, too
+    "-torch.log({})",
+    "torch.log(1 - torch.sigmoid({}))",
+):
+    cyclegan_loss.mistake(
+        "The game is played in squares here, the mean of (score - 1)^2; yours has logarithms.",
+        "((D_y(y_of_x) - 1) ** 2)",
+        f"({theirs.format('D_y(y_of_x)')})",
+        "((D_x(x_of_y) - 1) ** 2)",
+        f"({theirs.format('D_x(x_of_y)')})",
+    )
 cyclegan_loss.mistake(
     "What to_y has made is a y, and D_y judges it; your critics are swapped.",
     "D_y(y_of_x)",

@@ -133,6 +133,14 @@ there_and_back.mistake(
     "back[y.clip(0, height - 1), x.clip(0, width - 1)]",
     "back[x.clip(0, height - 1), y.clip(0, width - 1)]",
 )
+for first in ("there[points[:, 1], points[:, 0]]", "there[points[:, 0], points[:, 1]]"):
+    there_and_back.mistake(  # only where a point is inside, as in a loop
+        "A picture is asked for its row first: flow[y, x]. You ask flow[x, y].",
+        "there[points[:, 1], points[:, 0]]",
+        first,
+        "home = to + back[y.clip(0, height - 1), x.clip(0, width - 1)]",
+        "home = to.copy()\n    home[inside] += back[x[inside], y[inside]]",
+    )
 there_and_back.mistake(
     "A point comes to the pixel nearest to it: round, where you cut the fraction off.",
     "np.round(to).astype(int)",
