@@ -36,6 +36,10 @@ def again(target, tries):
     v, d = tries[-1] if tries else (1.0, 1 / (2 * 0.14 * 9.81))
     return v * (target / d) ** 0.5
 """,
+    1: """
+def spare(q, dq, M, J, gap, drift):
+    return -3 * J.T @ gap / max(np.linalg.norm(gap), 0.02) ** 2 - 6 * M @ dq
+""",
     2: """
 def temperature(share, entropy):
     return 0
