@@ -15,8 +15,8 @@ from tests.grade.cell.wire import Other, decode, encode
 from tests.grade.exercise import Exercise, everything, find
 from tests.grade.judge import judge, questions
 from tests.grade.notebook import StillOpen, here
-from tests.grade.sandbox import Sandbox
 from tests.grade.submission import Answer, answer, read
+from tests.kept import Kept
 
 ALL = everything()
 SOLVED = json.loads(
@@ -30,7 +30,7 @@ SEED = 7
 
 @pytest.fixture(scope="module")
 def box():
-    with Sandbox() as sandbox:
+    with Kept() as sandbox:
         yield sandbox
 
 

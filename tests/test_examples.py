@@ -18,8 +18,8 @@ from tests.grade.conftest import _exercise, pytest_collection_modifyitems, pytes
 from tests.grade.exercise import everything, find
 from tests.grade.files import File
 from tests.grade.judge import TRY, judge
-from tests.grade.sandbox import Sandbox
 from tests.grade.submission import RELEASED, Answer
+from tests.kept import Kept
 from tests.test_grading_files import notebook
 
 E61 = find("6.1")
@@ -28,7 +28,7 @@ RAISES = "def r1(z, z_E):\n    # nothing\n    return 1 / 0\n"
 
 @pytest.fixture(scope="module")
 def box():
-    with Sandbox() as sandbox:
+    with Kept() as sandbox:
         yield sandbox
 
 

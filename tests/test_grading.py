@@ -32,6 +32,9 @@ from tests.grade.files import File
 from tests.grade.judge import _questions
 from tests.grade.sandbox import Sandbox
 from tests.grade.submission import Answer
+from tests.kept import Kept
+
+pytestmark = pytest.mark.usefixtures("workers_wait")
 
 ROOT = Path(__file__).resolve().parent.parent
 SOURCE = ROOT / "solutions" / "06_reward.ipynb"
@@ -604,7 +607,7 @@ def test_an_answer_that_counts_its_calls_and_remembers_what_it_said_earns_nothin
         "    key = b''.join(x.tobytes() for x in args)\n"
         "    return heard.setdefault(key, said[min(len(heard), len(said) - 1)])\n"
     )
-    with Sandbox() as box:
+    with Kept() as box:
         result = grading.grade_one(exercise, Answer(source, [], ""), box, seed=2)
     assert result.points == 0
     assert "after other inputs" in " ".join(result.lines())
@@ -649,7 +652,7 @@ def test_one_open_case_costs_its_own_checks_only():
     exercise = find("10.4")
     last = "    if not expert.all():"
     source = exercise.source.replace(last, f"    {STUB}\n{last}")
-    with Sandbox() as box:
+    with Kept() as box:
         result = grading.grade_one(exercise, Answer(source, [], ""), box)
     assert 0 < result.points < result.most and not result.open
 

@@ -21,6 +21,8 @@ from tests.grade.reports import reports
 from tests.grade.sheets import sheet
 from tests.test_grading_files import notebook
 
+pytestmark = pytest.mark.usefixtures("workers_wait")
+
 E61, E62 = find("6.1"), find("6.2")
 HINT = E61.mistakes[0].hint
 

@@ -26,6 +26,8 @@ from tests.grade.exercise import everything
 from tests.grade.handed_in import Submission
 from tests.grade.notebook import StillOpen
 
+pytestmark = pytest.mark.usefixtures("workers_wait")
+
 ALL = everything()
 SOURCES = sources()
 by_name = pytest.mark.parametrize("path", SOURCES, ids=lambda p: p.stem)
