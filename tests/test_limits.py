@@ -119,7 +119,7 @@ STARTS = [
 ]
 
 
-@pytest.mark.parametrize("count", [40, pytest.param(500, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [20, pytest.param(500, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(("name", "arm"), SCENES)
 def test_no_start_is_deeper_in_contact_than_a_millimetre(name, arm, count):
     for options, jitter in STARTS:

@@ -28,7 +28,7 @@ def shipped(name):
     return load_recordings(tasks.VIDEOS / name / "experts.npz")
 
 
-@pytest.mark.parametrize("every", [7, pytest.param(1, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("every", [14, pytest.param(1, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", tasks.TASKS)
 def test_the_shipped_experts_played_again_go_where_they_went(name, every):
     experts = shipped(name)

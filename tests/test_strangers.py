@@ -3,6 +3,8 @@
 The long form is a measurement, whose numbers stand in solutions/results/README.md.
 """
 
+import functools
+
 import numpy as np
 import pytest
 
@@ -16,24 +18,29 @@ HELD_BACK, COUNT = 21, 36
 RIGHT = 0.75  # measured: 30 of 36; the goal is 0.95
 
 
+@functools.cache
+def developed(i):
+    return stranger(DEVELOPED, i)
+
+
 @pytest.mark.parametrize(
     ("i", "kind"),
     [(2, "zoom"), (4, "usable"), (5, "still"), (6, "short"), (9, "usable"), (10, "steep"),
-     (15, "usable"), (18, "usable")],
+     (15, "usable"), pytest.param(18, "usable", marks=pytest.mark.slow)],
 )  # fmt: skip
 def test_the_verdict_is_right(i, kind, tmp_path):
-    one = stranger(DEVELOPED, i)
+    one = developed(i)
     assert one.kind == kind
     assert judged(one, prepare(one.task, one.write(tmp_path)).verdict)
 
 
 def test_a_clip_is_the_same_whenever_it_is_made():
-    first, again = stranger(DEVELOPED, 6), stranger(DEVELOPED, 6)
+    first, again = developed(6), stranger(DEVELOPED, 6)
     assert np.array_equal(first.frames, again.frames) and first.task == again.task == "push"
 
 
 def test_a_verdict_is_right_if_its_reason_is():
-    still = stranger(DEVELOPED, 5)
+    still = developed(5)
     assert judged(still, "not usable: nothing moves in the clip; film an arm that does the task.")
     assert not judged(still, "not usable: the camera moves; put it on a stand.")
     assert not judged(still, "usable")

@@ -221,15 +221,12 @@ def overview(plan: Plan) -> str:
 
 def table_one() -> str:
     """Frames of both domains, ours / the paper's."""
-    rows = []
-    for i, domain in enumerate(("Source (human)", "Target (robot)")):
-        cells = []
-        for task in tasks.TASKS:
-            recipe = tasks.module(task).RECIPE
-            random = video.read(tasks.VIDEOS / task / "random.mp4", whole=True)[0]
-            ours = len(demo_of(task)) + len(random), recipe.robot_frames
-            cells.append(f"{ours[i]:,} / {TABLE_I[task][i]:,}")
-        rows.append([domain, *cells])
+    rows = [["Source (human)"], ["Target (robot)"]]
+    for task in tasks.TASKS:
+        random = video.read(tasks.VIDEOS / task / "random.mp4", whole=True)[0]
+        ours = len(demo_of(task)) + len(random), tasks.module(task).RECIPE.robot_frames
+        for row, count, papers in zip(rows, ours, TABLE_I[task], strict=True):
+            row.append(f"{count:,} / {papers:,}")
     return markdown(["domain", *tasks.TASKS], rows)
 
 
