@@ -262,6 +262,7 @@ def test_no_command_prints_the_tasks_and_three_commands_to_try(capfd):
     assert tried.count("python -m tasks ") == 4  # three, and how to read of options
 
 
+@pytest.mark.usefixtures("one_trial")
 def test_the_recipe_is_set_and_the_report_says_so(tmp_path):
     field = "policy_steps=60"
     fields = ["--set", field, "--set", "entropy=-2.5"]

@@ -273,9 +273,9 @@ def test_a_piece_can_be_asked_for(tmp_path):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="needs Linux, whose /proc tells the peak")
 def test_4k_needs_little_memory(tmp_path):
-    """60 frames are 750 MB, if what was decoded is kept."""
+    """30 frames are 375 MB, if what was decoded is kept."""
     large = (cv2.resize(f, (3840, 2160), interpolation=cv2.INTER_NEAREST) for f in [reach(1)[0]])
-    path = encode(tmp_path / "a.mp4", [*large] * 60, options={"preset": "ultrafast"})
+    path = encode(tmp_path / "a.mp4", [*large] * 30, options={"preset": "ultrafast"})
     code = (
         "import sys; from lbw_minimal.clips.reader import read_clip\n"
         # not getrusage's, in which the process that started this one counts, too

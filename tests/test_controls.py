@@ -240,7 +240,7 @@ def test_a_rival_is_tested_beside_it_on_the_same_starts(tmp_path, monkeypatch):
 def test_a_policy_by_object_tracks_is_tested_beside_it_as_it_was_trained(tmp_path, monkeypatch):
     """On the film of the run's own seed, from which its empty scene is made."""
     filmed, film = [], tasks.pace_film
-    monkeypatch.setattr(tasks, "pace_film", lambda *a: filmed.append(a) or film(*a))
+    monkeypatch.setattr(tasks, "pace_film", lambda *a: filmed.append(a) or film(*a, 100))
     (tmp_path / "settings.json").write_text('{"method": "tracks", "seed": 3}')
     sac.save(tmp_path / "policy.safetensors", sac.SAC(15, 3))
     assert controls.rival_wins("push", tmp_path, 0.01, episodes=1) == 0

@@ -20,8 +20,8 @@ from lbw_minimal.training import InputError
 from tasks.__main__ import main
 from tasks.push import RECIPE
 from tasks.world import expert_actions
-from tasks.world import film as film_of
 
+pytestmark = pytest.mark.usefixtures("one_trial")
 PATH = np.array([[0, 0], [0, 0], [4, 0], [8, 0]], float)  # L = 8
 still = np.zeros(2)
 
@@ -163,11 +163,14 @@ def test_an_idle_robot_earns_less_than_one_that_does_the_task(task):
     demo, _ = video.read(tasks.VIDEOS / task / "expert_01.mp4")
     film = tasks.pace_film(task, 0, 100)  # in so many the arm has been away from everywhere
     env, reward = follow.watched(gym.make(tasks.id_of(task), jitter=0.005), demo, film)
-    stage = tasks.bare(task, jitter=0.005)
-    _, _, take = film_of(stage, 7, expert_actions(stage))
+    stage, expert = tasks.bare(task, observation="state", jitter=0.005), []
+    stage.reset(seed=7)
+    for action in expert_actions(stage):
+        expert.append(action)
+        stage.step(action)
     stage.close()
     earned = []
-    for actions in (take.actions, []):
+    for actions in (expert, []):
         env.reset(seed=7)
         total, over = 0.0, False
         for t in range(reward.episode):

@@ -153,8 +153,16 @@ def test_setup_installs_the_requirements_within_the_lock(place):
     assert (place / "apt.log").read_text().splitlines()[0] == "update"
 
 
-def test_results_are_valid_and_shown_to_students_as_text(place):
-    found = graded(place, {"my own name.ipynb": notebook(), "notes.txt": ""})
+R2 = "# Exercise 6.2\ndef r2(z, z_next, z_E):\n    return 1.0"  # wrong, so inputs are shown
+FILES = {"my own name.ipynb": notebook(find("6.1").source, R2), "notes.txt": ""}
+
+
+@pytest.fixture(scope="module")
+def found(place):
+    return graded(place, FILES)
+
+
+def test_results_are_valid_and_shown_to_students_as_text(found):
     assert faults(found) == []
     assert [t["number"] for t in found["tests"]] == [f"6.{i}" for i in range(1, 6)]
     first, second = found["tests"][:2]
@@ -173,9 +181,8 @@ def test_several_notebooks_are_one_submission_and_none_is_a_valid_result(place):
     assert faults(nothing) == [] and "no notebook found" in nothing["output"]
 
 
-def test_each_student_is_asked_the_same_with_the_seed_of_the_archive(place):
-    files = {"06_reward.ipynb": notebook(WRONG)}
-    assert graded(place, files) == graded(place, files)
+def test_each_student_is_asked_the_same_with_the_seed_of_the_archive(place, found):
+    assert graded(place, FILES) == found and "r2(" in found["tests"][1]["output"]
     said = (place / "source" / "set.env").read_text()
     assert said.startswith("NOTEBOOKS=6\nSEED=") and int(said.split("=")[2]) < 1 << 31
     gradescope.archive(place / "another.zip", "6")

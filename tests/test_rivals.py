@@ -17,6 +17,7 @@ from tasks.commands.run import TEST_SEED
 from tasks.world import film as film_of
 from tasks.world import load_recordings, record_expert
 
+pytestmark = pytest.mark.usefixtures("one_trial")
 TINY = Recipe(
     human_frames=0, robot_frames=0, munit_iterations=2, munit_width=4,
     classifier_iterations=5, policy_steps=40,
