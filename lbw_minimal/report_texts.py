@@ -36,8 +36,8 @@ iframe { width: 100%; height: min(26rem, 65vh) }
 table { border-collapse: collapse; margin: .8rem 0; font-size: .92rem; display: block;
         overflow-x: auto }
 th, td { text-align: left; padding: .25rem 1.1rem .25rem 0; border-bottom: 1px solid var(--line) }
-pre { white-space: pre-wrap; background: var(--panel); border-radius: 8px; padding: .7rem .9rem;
-      overflow-x: auto }
+pre { white-space: pre-wrap; overflow-wrap: anywhere; background: var(--panel);
+      border-radius: 8px; padding: .7rem .9rem }
 .still { display: none }
 @media print { nav, .scene, iframe { display: none } .still { display: block }
                h1, h2, h2 + p { break-after: avoid } h2, figure, img, tr { break-inside: avoid } }

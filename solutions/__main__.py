@@ -59,6 +59,8 @@ body:has(#plain:checked) .jp-InputArea:has(.jp-CodeMirrorEditor) { display: none
 body:has(#plain:checked) .jp-InputPrompt { visibility: hidden }
 body:has(#plain:checked) .jp-OutputPrompt { visibility: hidden }
 math[display=block] { margin: .8em 0 }
+/* Within a sentence colour alone does not tell a link. */
+.jp-RenderedHTMLCommon :is(p, li, td) a { text-decoration: underline !important }
 img { max-width: 100% }
 .jp-InputArea-editor, .jp-OutputArea-output { overflow-x: auto !important }
 @media print, (max-width: 40rem) {
