@@ -1,14 +1,11 @@
-"""What all tests share."""
+"""What all tests share. The process that deals them out to others reads this, too, and it imports
+nothing that takes long."""
 
 import functools
 import sys
 from pathlib import Path
 
 import pytest
-import torch
-
-import tasks
-from lbw_minimal import sac
 
 # jsonschema looks for it and builds its grammar in 1.3 s, for IRIs, which nothing here has.
 sys.modules["rfc3987_syntax"] = None
@@ -41,13 +38,15 @@ if not any((Path(__file__).parent.parent / "solutions").glob("*.ipynb")):
 @pytest.fixture(autouse=True)
 def one_thread():
     """Two threads wait for each other where the second core is busy, and take ten times as long."""
+    import torch
+
     torch.set_num_threads(1)
 
 
 @pytest.fixture
 def one_trial(monkeypatch):
     """A training of some steps has one actor worth a name: an episode is enough to choose it."""
-    monkeypatch.setattr(sac, "TRIALS", 1)
+    monkeypatch.setattr("lbw_minimal.sac.TRIALS", 1)
 
 
 @pytest.fixture(scope="session")
@@ -65,6 +64,8 @@ def workers_wait():
 @pytest.fixture(scope="session", autouse=True)
 def robots_filmed_once():
     """The film that shows a robot's pace takes seconds, and hangs on its arguments alone."""
+    import tasks
+
     film = functools.cache(tasks.pace_film)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(tasks, "pace_film", lambda *asked: film(*asked).copy())

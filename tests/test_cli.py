@@ -184,8 +184,8 @@ def test_a_mistake_gets_one_sentence_and_leaves_no_trace(mistake, tmp_path, capf
 
 
 def test_the_shipped_policy_is_replayed_for_as_many_episodes_as_asked(tmp_path, capfd):
-    assert main(["push", "--evaluate", "--episodes", "2", "--out", str(tmp_path)]) == 0
-    assert "push: 2/2 successes" in capfd.readouterr().out
+    assert main(["reach", "--evaluate", "--episodes", "2", "--out", str(tmp_path)]) == 0
+    assert "reach: 2/2 successes" in capfd.readouterr().out
     metrics = json.loads((tmp_path / "metrics.json").read_text())
     assert [e["seed"] for e in metrics["episodes"]] == [1_000_000, 1_000_001]
     assert "A test episode" in (tmp_path / "report.html").read_text()
