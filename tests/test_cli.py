@@ -300,7 +300,7 @@ def test_random_motion_is_read_where_something_learns_from_it(tmp_path, monkeypa
 
 
 def test_a_policy_of_the_other_reward_is_refused(tmp_path, capfd):
-    arguments = ["push", "--evaluate", "--reward", "literal", "--out", str(tmp_path)]
+    arguments = ["reach", "--evaluate", "--reward", "literal", "--out", str(tmp_path)]
     assert main(arguments) == 2
     assert "give the --reward it was trained with" in capfd.readouterr().err
 
