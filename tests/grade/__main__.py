@@ -25,7 +25,6 @@ from dataclasses import asdict
 from pathlib import Path
 
 from lbw_minimal.training import InputError, write_atomic
-from tasks.commands.cluster import leave
 from tests.grade import feedback, sandbox
 from tests.grade.exercise import Exercise, everything
 from tests.grade.files import File, in_order, printable
@@ -79,6 +78,8 @@ def main(argv=None) -> int:
         return 130
     with ThreadPoolExecutor(1) as aside:  # to end Ray takes as long as to write the reports
         if args.ray:
+            from tasks.commands.cluster import leave  # Gradescope's archive has no tasks
+
             aside.submit(leave)
         written = _written(args.out, entries, grades, ids)
     return 0 if written and not any("failed" in g for g in grades) else 1
