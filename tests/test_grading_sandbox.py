@@ -270,6 +270,14 @@ def test_an_exercise_has_a_limit_for_all_its_calls(box, monkeypatch):
     assert "more than 2 s together" in said and time.monotonic() - began < 20
 
 
+def test_what_an_answer_leaves_in_cycles_is_freed(box):
+    source = "import gc\ndef look():\n    return gc.isenabled()"
+    box.allow(sandbox.EXERCISE)
+    assert box.open(Exercise("0.0", "", "look", "", "", "probe = look"), source, []) is None
+    assert box.call(()) == (True, False)
+    box.close()
+
+
 # bubblewrap
 
 

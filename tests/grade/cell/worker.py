@@ -77,6 +77,7 @@ def main(fd: int, readable: list[str]) -> None:
     `control`, which that process does not have, the judge asks for its end, and hears of it.
     """
     control = socket.socket(fileno=fd)
+    gc.disable()  # it would look at all that is loaded again and again, and find nothing to free
     exec(answer.PREAMBLE, space := {})
     for name in USED:
         importlib.import_module(name)
@@ -86,6 +87,7 @@ def main(fd: int, readable: list[str]) -> None:
     for threads in (True, False):
         walls.allowed(threads)
     gc.freeze()  # or each fork's collector would write to, and so copy, all that is loaded here
+    gc.enable()
     walls.gather_memory()
     wire.send(control, b"ready")
     while True:
