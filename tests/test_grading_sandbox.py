@@ -271,11 +271,8 @@ def test_an_exercise_has_a_limit_for_all_its_calls(box, monkeypatch):
 
 
 def test_what_an_answer_leaves_in_cycles_is_freed(box):
-    source = "import gc\ndef look():\n    return gc.isenabled()"
     box.allow(sandbox.EXERCISE)
-    assert box.open(Exercise("0.0", "", "look", "", "", "probe = look"), source, []) is None
-    assert box.call(()) == (True, False)
-    box.close()
+    assert ask(box, "import gc\ndef look():\n    return gc.isenabled()") is True
 
 
 # bubblewrap

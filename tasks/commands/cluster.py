@@ -1,8 +1,9 @@
 """Jobs on many machines: Ray runs them, starts them again, and knows where there is room.
 
 A job is a call of a function with plain values. What it returns comes back through Ray, files as
-bytes: the machines need no common folder. The kit's files travel with the jobs; each node needs
-Python with requirements.txt and requirements-cluster.txt installed.
+bytes: the machines need no common folder. A local cluster reads the kit's files where they are, to
+another they travel; each node needs Python with requirements.txt and requirements-cluster.txt
+installed.
 """
 
 from __future__ import annotations
@@ -19,7 +20,8 @@ from typing import Any
 from lbw_minimal.training import InputError
 
 ROOT = Path(__file__).resolve().parents[2]
-SHIPPED = ("lbw_minimal", "notebooks", "solutions", "tasks", "tests")  # of the kit: 25 MB
+CODE = ("lbw_minimal", "notebooks", "tasks", "tests")  # of the kit, with the videos: 7 MB
+KIT = (*CODE, "solutions")  # with the weights: 30 MB
 LEAN = Path(__file__).with_name("lean")  # for the path of Ray's processes: see what lies there
 RETRIES = 3  # new starts of a job whose worker or node was lost
 # Python that dies with its parent (prctl 1, PR_SET_PDEATHSIG): nobody would end it on a lost node.
@@ -34,10 +36,10 @@ class Refused(Exception):
     """A node will not do such jobs; the message says why. The job goes to another node."""
 
 
-def connect() -> Any:
+def connect(kit: tuple[str, ...] = KIT) -> Any:
     """Ray, connected to the cluster that runs here or at RAY_ADDRESS, else to a local one.
 
-    Raises InputError without Ray.
+    kit: what of the kit goes to a cluster that runs. Raises InputError without Ray.
     """
     sys.path.insert(0, str(LEAN))
     try:
@@ -51,11 +53,11 @@ def connect() -> Any:
     if not ray.is_initialized():
         os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
         os.environ.setdefault("RAY_OVERRIDE_RUNTIME_ENV_DEFAULT_EXCLUDES", "")  # ours say it all
-        others = [f"/{path.name}" for path in ROOT.iterdir() if path.name not in SHIPPED]
-        kit: dict[str, Any] = {"working_dir": str(ROOT), "excludes": others}
-        kit["py_modules"] = [str(LEAN / "rfc3987_syntax")]
+        others = [f"/{path.name}" for path in ROOT.iterdir() if path.name not in kit]
+        there: dict[str, Any] = {"working_dir": str(ROOT), "excludes": others}
+        there["py_modules"] = [str(LEAN / "rfc3987_syntax")]
         try:
-            ray.init(address="auto", runtime_env=kit, logging_level="warning")
+            ray.init(address="auto", runtime_env=there, logging_level="warning")
         except ConnectionError:
             with on_path(LEAN, ROOT):  # a local one finds the kit where it is
                 ray.init(address="local", include_dashboard=False, logging_level="warning")
@@ -81,13 +83,16 @@ def leave() -> None:
         ray.shutdown()
 
 
-def spread(function: Callable, jobs: Iterable[tuple[Any, tuple, int]]) -> Iterator[tuple[Any, Any]]:
+def spread(
+    function: Callable, jobs: Iterable[tuple[Any, tuple, int]], kit: tuple[str, ...] = KIT
+) -> Iterator[tuple[Any, Any]]:
     """function(*arguments) for each (name, arguments, bytes of memory) of `jobs`, a core each.
 
-    Yields (name, result) in the order in which they end; the result is an exception where the
-    function raised one or its worker was lost too often. Raises InputError if all nodes refuse.
+    kit: see `connect`. Yields (name, result) in the order in which they end; the result is an
+    exception where the function raised one or its worker was lost too often. Raises InputError if
+    all nodes refuse.
     """
-    ray = connect()
+    ray = connect(kit)
     task = ray.remote(num_cpus=1, max_retries=RETRIES)(attempt)
     refused: dict[str, str] = {}  # by node
 

@@ -17,7 +17,8 @@ MEMORY = 1 << 30  # bytes a submission is given: the judge and the sandbox
 
 def spread(jobs: list[tuple[Path, tuple]]) -> Iterator[tuple]:
     """`grade_here` on a cluster, see `spread` there. Nothing to do needs no cluster."""
-    return cluster.spread(grade_here, [(*job, MEMORY) for job in jobs]) if jobs else iter(())
+    work = [(*job, MEMORY) for job in jobs]
+    return cluster.spread(grade_here, work, cluster.CODE) if jobs else iter(())
 
 
 def grade_here(
