@@ -55,7 +55,8 @@ def _look(source: str) -> tuple[set[str], set[str]]:
     """`Cell.defines` and `Cell.checks`."""
     tree = _parse(source)
     body = [node for node in (tree.body if tree else []) if not is_stub(node)]
-    return set().union(*map(bound, body)), set().union(*map(_checked, body))
+    checks = set().union(*map(_checked, body)) if "check" in source else set()
+    return set().union(*map(bound, body)), checks
 
 
 _look_at_course = functools.cache(_look)  # most cells of a class are the same
@@ -143,7 +144,12 @@ def _marked(cell, source: str) -> str:
     title = re.match(r"#\s*Exercise (\d+\.\d+)\b", source)
     known = everything()
     by_title = title[1] if title and title[1] in known else ""
-    return next((id for id, e in known.items() if e.grade_id == grade_id), by_title)
+    return _by_grade_id().get(grade_id, by_title) if isinstance(grade_id, str) else by_title
+
+
+@functools.cache
+def _by_grade_id() -> dict[str, str]:
+    return {e.grade_id: id for id, e in everything().items()}
 
 
 def _plain(text: str) -> str:
@@ -203,6 +209,7 @@ def _inside(line: str, quotes: str, depth: int) -> tuple[str, int]:
             depth = max(0, depth - 1)
 
 
+@functools.lru_cache(maxsize=1)  # `_plain` asks first, and then `_look`
 def _parse(source: str) -> ast.Module | None:
     try:
         return ast.parse(source)
