@@ -55,6 +55,12 @@ def wander(rng):
 def hold(maps):
     return transporter.soft_argmax(torch.from_numpy(maps)[None])[0].numpy()
 """,
+    9: """
+def steer(z, actions, z_E):
+    J = np.linalg.lstsq(actions, np.diff(z, axis=0).reshape(len(actions), -1), rcond=None)[0].T
+    back = np.linalg.pinv(J)
+    return lambda z, t: np.clip(back @ (z_E[t + 1] - z).ravel(), -1, 1)
+""",
     10: """
 def sees(play):
     won = [sum(play(camera, 1.0) for _ in range(15)) for camera in ("open", "grey")]
