@@ -161,11 +161,8 @@ BAD = {
 def learnt_by_heart(exercise):
     """An answer that has the inputs of the students' own check and their results in a table."""
     reference, table = exercise.run(exercise.source), {}
-    for i, check in enumerate(exercise.checks):
-        rng = np.random.default_rng([0, i])
-        for _ in range(check.trials):
-            args = check.inputs(rng)
-            table[b"".join(x.tobytes() for x in args)] = float(reference(args))
+    for _, args in _questions(exercise, 0):
+        table[b"".join(x.tobytes() for x in args)] = float(reference(args))
     lookup = "[z.tobytes() + z_E.tobytes()]"
     return f"TABLE = {table!r}\ndef r1(z, z_E):\n    return TABLE{lookup}"
 

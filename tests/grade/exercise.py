@@ -41,6 +41,7 @@ NOTHING = 1e-12  # what is smaller is written as 0
 class Check:
     """`inputs(rng)` makes the arguments; the answer has to equal the reference's within tolerances.
 
+    least(rng) makes those of one question more, of the smallest sizes that the text allows.
     verify(got, args) judges instead, where many answers are right: it returns a sentence, or None
     if all is well.
     """
@@ -52,6 +53,7 @@ class Check:
     rtol: float
     trials: int
     verify: Callable | None
+    least: Callable | None = None
 
 
 @dataclass
@@ -64,7 +66,10 @@ class Mistake:
 
 @dataclass(eq=False)
 class Exercise:
-    """See the module's text. probe: code that defines `probe(*args)`, how the answer is called."""
+    """See the module's text. probe: code that defines `probe(*args)`, how the answer is called.
+
+    changes: the places of arguments that the answer may change; it leaves the others as they are.
+    """
 
     id: str
     title: str
@@ -72,6 +77,7 @@ class Exercise:
     source: str  # of the reference
     given: str  # code that the cell may rely on
     probe: str
+    changes: tuple[int, ...] = ()
     checks: list[Check] = field(default_factory=list)
     mistakes: list[Mistake] = field(default_factory=list)
 
@@ -90,11 +96,26 @@ class Exercise:
         """The id of its cell; nbgrader allows no dot."""
         return "ex-" + self.id.replace(".", "-")
 
+    @property
+    def job(self) -> dict:
+        """What a process has to know that calls its answer."""
+        return {key: getattr(self, key) for key in ("name", "given", "probe", "changes")}
+
     def check(
-        self, label, inputs, *, points=1, atol=1e-5, rtol=1e-4, trials=TRIALS, verify=None
+        self,
+        label,
+        inputs,
+        *,
+        points=1,
+        atol=1e-5,
+        rtol=1e-4,
+        trials=TRIALS,
+        verify=None,
+        least=None,
     ) -> None:
         """Add a check."""
-        self.checks.append(Check(label, inputs, points, atol, rtol, trials, verify))
+        trials += bool(least)
+        self.checks.append(Check(label, inputs, points, atol, rtol, trials, verify, least))
 
     def mistake(self, hint: str, *edits: str) -> None:
         """Add a mistake: the reference with `edits`, old, new, old, new ..., replaced.
@@ -138,6 +159,8 @@ GRADIENTS = """
         *args, ask = args
         if ask == "values":
             return {name}(*args)
+        for i in {graph}:
+            args[i] = args[i].clone().requires_grad_()
         leaves = {{k: args[i].clone().requires_grad_() for i, k in {leaves}.items()}}
         for i, k in {leaves}.items():
             args[i] = leaves[k]
@@ -147,8 +170,6 @@ GRADIENTS = """
             out = tuple(out) if {several} else (out,)
         except TypeError:  # one number
             return out
-        if not all(leaf.requires_grad for leaf in leaves.values()):
-            raise ValueError("detach_() cuts the caller's own tensor off: detach() makes a new one")
         for j, part in enumerate(out):
             if torch.is_tensor(part) and part.requires_grad:
                 # Weighted, or in a sum of many numbers gradients could cancel.
@@ -167,20 +188,22 @@ GRADIENTS = """
 """
 
 
-def gradients(name: str, several: bool = False, **leaves: int) -> str:
+def gradients(name: str, several: bool = False, graph: tuple = (), **leaves: int) -> str:
     """A probe that asks for "values" or for the "gradient" with respect to some arguments.
 
-    name: of the function. several: whether it returns several tensors. leaves: names and positions
-    of these arguments.
+    name: of the function. several: whether it returns several tensors. graph: positions of further
+    arguments that have a gradient, and nobody asks for it. leaves: names and positions of those
+    that are asked for.
     """
-    return GRADIENTS.format(name=name, several=several, leaves={i: k for k, i in leaves.items()})
+    places = {i: k for k, i in leaves.items()}
+    return GRADIENTS.format(name=name, several=several, graph=graph, leaves=places)
 
 
-def exercise(id: str, title: str, *, given: tuple = (), probe: str = ""):
+def exercise(id: str, title: str, *, given: tuple = (), probe: str = "", changes: tuple = ()):
     """Make an exercise of the function or class below.
 
-    given: functions, classes, lines of code or other exercises that the answer may use. probe: see
-    Exercise.
+    given: functions, classes, lines of code or other exercises that the answer may use. probe and
+    changes: see Exercise.
     """
 
     def wrap(thing) -> Exercise:
@@ -191,7 +214,7 @@ def exercise(id: str, title: str, *, given: tuple = (), probe: str = ""):
         before = "\n\n".join(map(_text, given))
         name = thing.__name__
         call = textwrap.dedent(probe) or f"probe = {name}\n"
-        return Exercise(id, title, name, source, before, call)
+        return Exercise(id, title, name, source, before, call, changes)
 
     return wrap
 

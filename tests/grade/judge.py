@@ -26,7 +26,14 @@ OPEN = ("NotImplementedError", "StillOpen")  # what an untouched exercise raises
 UNDONE = "not done yet"
 ALONE = threading.RLock()  # torch has one generator of random numbers for all threads
 TRY = "The smallest input that fails, to paste:"
-CHANGES = "it changes its inputs: work on a copy"
+CHANGES = {  # by the kinds of `cell.answer.state`
+    "graph": "it cuts an input off from its gradient for good, as detach_ and requires_grad_ do: "
+    "leave it as it is; detach() makes a new tensor",
+    "mode": "it changes the mode of a network it was given, by train or eval: leave it as it is",
+    "values": "it changes its inputs: work on a copy",
+    "grad": "it clears or adds to gradients of what it was given, as zero_grad and backward do: "
+    "leave them as they are",
+}
 
 
 def settle() -> None:
@@ -102,7 +109,8 @@ def best(ways: Iterable[Callable[[], Result]]) -> Result:
 
 
 def judge(exercise: Exercise, call, seed: int = 0, renew=None) -> Result:
-    """Run all checks of an exercise on the answer behind call(args) -> (value, changed its inputs).
+    """Run all checks of an exercise on the answer behind call(args) -> (value, the kind of what it
+    changed of its inputs or "").
 
     renew(agrees) has agrees(call) tried on that answer afresh, as if it had never been called, and
     returns what is to be said against it. A call that raises Lost ends the exercise: what was
@@ -127,7 +135,7 @@ def judge(exercise: Exercise, call, seed: int = 0, renew=None) -> Result:
             said[i] = UNDONE
             continue
         asked.append(Asked(checks[i], question, got))
-        said[i] = said[i] or asked[-1].message or (CHANGES if changed else "")
+        said[i] = said[i] or CHANGES.get(changed) or asked[-1].message
     if all(message == UNDONE for message in said):
         return nothing(exercise, UNDONE, open=True)
     result = Result(exercise.id, exercise.title)
@@ -192,8 +200,9 @@ def _questions(exercise: Exercise, seed: int):
     """(check, inputs) in an order that hangs on the seed."""
     sources = [np.random.default_rng([seed, i]) for i in range(len(exercise.checks))]
     order = np.repeat(np.arange(len(sources)), [c.trials for c in exercise.checks])
-    for i in np.random.default_rng([seed, len(sources)]).permutation(order):
-        yield int(i), exercise.checks[i].inputs(sources[i])
+    least = {i: c.least for i, c in enumerate(exercise.checks) if c.least}
+    for i in map(int, np.random.default_rng([seed, len(sources)]).permutation(order)):
+        yield i, (least.pop(i, None) or exercise.checks[i].inputs)(sources[i])
 
 
 def _theirs(exercise: Exercise, mistake: int, question: Question):
@@ -247,6 +256,8 @@ def _message(check: Check, got, question: Question) -> str:
         return got.text
     if type(got) is Raised and got == "RuntimeError" and "requires grad" in got.text:
         where = f" ({got.line})" if got.line else ""
+        if "in-place" in got.text:  # of an input, which is a leaf
+            return f"{CHANGES['values']}{where}"
         return f"it leaves torch, and the gradient ends there: {got.text}{where}"
     if type(got) is Raised and got == "MemoryError":
         return "it needs more memory than an exercise may take (2 GB)"

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from contextlib import contextmanager
 from types import ModuleType
 
-from tests.grade.cell.answer import FORBIDDEN, PREAMBLE, Hidden, ask, explained, own_lines
+from tests.grade.cell.answer import FORBIDDEN, PREAMBLE, Hidden, ask, explained, own_lines, watch
 from tests.grade.cell.wire import decode, encode
 from tests.grade.exercise import Exercise, find
 from tests.grade.judge import Result, best, forget, judge
@@ -88,12 +88,12 @@ def here(exercise: Exercise, space: dict, over: bool):
     why = {name: ImportError(own_lines(name)) for name in package}
     there = {name: v for name, v in given.items() if name not in space or name in package}
     there |= {name: given[name] for name in exercise.gives if over}
-    exec(exercise.probe, probing := {**library, **given, **space, **there})
-    probe = probing["probe"]
+    probing = {**library, **given, **space, **there}
+    watched = watch(probing, exercise.job)
 
     def call(args):
         with _within(WALL), _swapped(space, there, package), _hidden():
-            value, changed, e = ask(probe, encode(args))
+            value, changed, e = ask(probing["probe"], watched, encode(args))
         if isinstance(e, TooLong):  # one is enough: each of the others would take as long
             raise Lost(f"{value.text} ({value.line})" if value.line else value.text)
         value = value if e is None else explained(value, e, why)

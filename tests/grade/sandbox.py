@@ -247,7 +247,10 @@ class Sandbox:
         return failed
 
     def call(self, args: tuple):
-        """(what the probe returned or raised, whether it changed its arguments). Raises Lost."""
+        """(what the probe returned or raised, the kind of what it changed of its arguments or "").
+
+        Raises Lost.
+        """
         try:
             self.channel.settimeout(self._seconds())
             wire.send(self.channel, wire.encode(args))
@@ -256,7 +259,7 @@ class Sandbox:
         answer = self._answer()
         if type(answer) is not list or len(answer) != 2:
             raise self._lost(NO_ANSWER)
-        return answer[0], answer[1] is True
+        return answer[0], answer[1] if isinstance(answer[1], str) else ""
 
     def close(self) -> None:
         """Leave the exercise; its process is ended."""
@@ -297,8 +300,12 @@ class Sandbox:
 
 def _job(exercise: Exercise, source: str, helpers: list, below: list, how: dict) -> dict:
     job = {"source": source, "helpers": list(helpers), "below": list(below)}
-    job |= {"name": exercise.name, "given": exercise.given, "probe": exercise.probe}
-    return job | {"memory": MEMORY, "cpu": CPU, "over": False, "definitions_only": False} | how
+    return (
+        job
+        | exercise.job
+        | {"memory": MEMORY, "cpu": CPU, "over": False, "definitions_only": False}
+        | how
+    )
 
 
 def _receive(channel: socket.socket, seconds: float, most: int = wire.MOST) -> bytes:

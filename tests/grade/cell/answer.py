@@ -295,22 +295,85 @@ def define(job: dict) -> Cells:
 # From inputs to what the answer returns
 
 
-def ask(probe, request: bytes, catch=Exception):
-    """(what the probe returns or raises, whether it changed its arguments, the exception)."""
+class Watched:
+    """An answer's function, which also notes what it leaves of its arguments otherwise.
+
+    free: the places of arguments that it may change. said: the kind of the first change, see
+    `state`, or "".
+    """
+
+    def __init__(self, function, free):
+        self.function, self.free = function, set(free)
+        self.said, self.inside = "", False
+
+    def __call__(self, *args, **named):
+        if self.inside:  # it calls itself, with what may be its own
+            return self.function(*args, **named)
+        kept = [x for i, x in enumerate(args) if i not in self.free] + [*named.values()]
+        before, self.inside = [state(x) for x in kept], True
+        try:
+            value = self.function(*args, **named)
+        finally:
+            self.inside = False
+        for old, new in zip(before, map(state, kept), strict=True):
+            self.said = self.said or next((kind for kind in old if old[kind] != new[kind]), "")
+        return value
+
+
+def state(x) -> dict:
+    """What an answer has to leave as it is of an argument, by kinds: whether tensors in it have a
+    gradient, a network's mode, numbers, and gradients that have been summed up."""
+    found = list(_tensors(x))
+    return {
+        "graph": [(t.requires_grad, t.is_leaf) for t in found],
+        "mode": [part.training for part in x.modules()] if hasattr(x, "modules") else [],
+        "values": [wire.encode(part) for part in (x, *found)],
+        "grad": [wire.encode(t.grad if t.is_leaf else None) for t in found],
+    }
+
+
+def _tensors(x):
+    """The tensors of an argument, in lists, dictionaries and networks, too."""
+    if hasattr(x, "requires_grad"):
+        yield x
+    elif hasattr(x, "state_dict"):
+        yield from (*x.parameters(), *x.buffers())
+    elif isinstance(x, list | tuple | dict):
+        for part in x.values() if isinstance(x, dict) else x:
+            yield from _tensors(part)
+
+
+def watch(names: dict, job: dict) -> Watched:
+    """Define the probe among an answer's names, and watch the function that it calls.
+
+    job: see `define`; probe, code; changes, the places of arguments that the answer may change.
+    A class is not watched: what it changes is its own.
+    """
+    watched = Watched(names[job["name"]], job["changes"])
+    if not isinstance(watched.function, type):
+        names[job["name"]] = watched
+    exec(compile(job["probe"], "the check", "exec"), names)
+    return watched
+
+
+def ask(probe, watched: Watched, request: bytes, catch=Exception):
+    """(what the probe returns or raises, the kind of what it changed of its arguments or "", the
+    exception)."""
     import torch
 
+    watched.said = ""
     args = wire.decode(request, torch.from_numpy)
     torch.default_generator.manual_seed(0)  # not those of devices, which take a while
     trains = torch.is_grad_enabled()
     try:
         value = probe(*args)
     except catch as e:
-        return raised(e), False, e
+        return raised(e), "", e
     if trains and not torch.is_grad_enabled():
         torch.set_grad_enabled(True)
         why = "it leaves autograd switched off; `with torch.no_grad():` switches it on again"
         value = wire.Raised("RuntimeError", why)
-    return value, wire.encode(args) != request, None
+    return value, watched.said or ("values" if wire.encode(args) != request else ""), None
 
 
 def raised(e: BaseException) -> wire.Raised:

@@ -47,7 +47,7 @@ def define_and_answer(job: dict, channel) -> dict | None:
 
     try:
         cells = answer.define(job)
-        exec(compile(job["probe"], "the check", "exec"), cells.names)
+        watched = answer.watch(cells.names, job)
     except BaseException as e:
         say(answer.raised(e))
         return None
@@ -60,11 +60,11 @@ def define_and_answer(job: dict, channel) -> dict | None:
             return None
         if not request:
             return wire.decode(wire.receive(channel))
-        value, changed, e = answer.ask(cells.names["probe"], request, BaseException)
+        value, changed, e = answer.ask(cells.names["probe"], watched, request, BaseException)
         if below and isinstance(e, NameError | AttributeError):
             cells.fill(below)
             below = []
-            value, changed, e = answer.ask(cells.names["probe"], request, BaseException)
+            value, changed, e = answer.ask(cells.names["probe"], watched, request, BaseException)
         if e is not None:
             value = answer.explained(value, e, cells.why)
         say(value, changed)

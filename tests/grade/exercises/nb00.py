@@ -14,6 +14,7 @@ success_rate.check("ten episodes", lambda rng: (rng.uniform(0, 0.1, 10), 0.05))
 success_rate.check(
     "any number of episodes, any threshold",
     lambda rng: (rng.uniform(0, 1, rng.integers(11, 40)), float(rng.uniform(0.2, 0.8))),
+    least=lambda rng: (rng.uniform(0, 0.2, 1), 0.3),
 )
 success_rate.check("all of them", lambda rng: (rng.uniform(0, 0.04, 5), 0.05))
 success_rate.check(
@@ -96,6 +97,7 @@ to_pixels.check("keypoints anywhere", lambda rng: (rng.uniform(-1, 1, (5, 2)), 8
 to_pixels.check(
     "a whole trajectory, another size",
     lambda rng: (rng.uniform(-1, 1, (*rng.integers(3, 12, 2), 2)), int(rng.integers(90, 250))),
+    least=lambda rng: (rng.uniform(-1, 1, (1, 1, 2)), int(rng.integers(90, 250))),
 )
 to_pixels.check(
     "the corners",
@@ -135,6 +137,11 @@ to_pixels.mistake(
     "pixels.",
     "/ 2 * size",
     "/ 2 * (size - 1)",
+)
+to_pixels.mistake(
+    "Pixels are counted from 0 at the edge, not from a pixel's centre: take no half off.",
+    "(z + 1) / 2 * size",
+    "(z + 1) / 2 * size - 0.5",
 )
 to_pixels.mistake(
     "Pixels are counted from 0 here, at the left and upper edge, to `size`: yours from 1.",

@@ -65,6 +65,11 @@ response.mistake(
     "x0 - x0 * (1 + w * t) * np.exp(-w * t)",
 )
 response.mistake(
+    "x0 times the bracket (1 + w t) times the exponential: without its brackets x0 never decays.",
+    "x0 * (1 + w * t) * np.exp(-w * t)",
+    "x0 * 1 + w * t * np.exp(-w * t)",
+)
+response.mistake(
     "The exponential multiplies the whole bracket, (1 + w t); yours damps w t alone.",
     "x0 * (1 + w * t) * np.exp(-w * t)",
     "x0 * (1 + w * t * np.exp(-w * t))",
@@ -80,6 +85,7 @@ task_inertia.check("a seven-joint arm", _arm)
 task_inertia.check(
     "a two-joint arm, one direction",
     lambda rng: (rng.normal(size=(1, 2)), np.diag(rng.uniform(0.3, 3, 2))),
+    least=lambda rng: (rng.uniform(0.3, 3, (1, 1)), rng.uniform(0.3, 3, (1, 1))),
 )
 task_inertia.mistake(
     "You left out the last inverse: J M^-1 J^T is mobility, Lambda is its inverse.",
@@ -110,6 +116,16 @@ task_inertia.mistake(
     "* multiplies number by number; matrices are multiplied with @.",
     "J @ np.linalg.inv(M) @ J.T",
     "J * np.linalg.inv(M) * J.T",
+)
+task_inertia.mistake(
+    "1 / M turns over each number by itself; the inverse of a matrix is np.linalg.inv(M).",
+    "np.linalg.inv(M)",
+    "(1 / M)",
+)
+task_inertia.mistake(
+    "J keeps all its rows, those of rotation, too: Lambda is (m, m), for any m.",
+    "    return np.linalg.inv(J",
+    "    J = J[:3]\n    return np.linalg.inv(J",
 )
 task_inertia.mistake(
     "Joints feel each other: M has numbers beside its diagonal, and you leave them out.",
@@ -165,6 +181,11 @@ osc.mistake(
 osc.mistake(
     "A force at the tip becomes torques by J's transpose.", "J.T @ task_inertia", "J @ task_inertia"
 )
+osc.mistake(
+    "A force at the tip becomes torques by J's transpose, J.T: the pseudo-inverse is for motions.",
+    "J.T @ task_inertia",
+    "np.linalg.pinv(J) @ task_inertia",
+)
 osc.mistake("The damping is missing: - kd v.", " - kd * v", "")
 osc.mistake(
     "kd is 2 sqrt(kp), whatever kp is; 40 belongs to kp = 400 alone.",
@@ -197,6 +218,7 @@ nullspace.check("a seven-joint arm", _arm, points=2)
 nullspace.check(
     "a four-joint arm, three directions",
     lambda rng: (rng.normal(size=(3, 4)), np.diag(rng.uniform(0.5, 2, 4))),
+    least=lambda rng: (rng.uniform(0.3, 3, (1, 1)), rng.uniform(0.3, 3, (1, 1))),
 )
 nullspace.mistake(
     "That is the projector of geometry, for velocities: forces need the one weighted with M.",
@@ -261,8 +283,16 @@ nullspace.mistake(
             raise ValueError("the start is drawn from np.random, not from self.np_random")
         return start, info
 
+    def of_truth(x):
+        return "a truth value" if isinstance(x, bool | np.bool_) else type(x).__name__
+
     def probe(actions, seed, ask):
         env = Point()
+        if not np.array_equal(*(seeded(Point(), seed)[0] for _ in range(2))):
+            raise ValueError(
+                "the same seed starts at another place the second time: call "
+                "super().reset(seed=seed), then draw from self.np_random"
+            )
         episodes = []
         edge = 0.05 if seed % 2 else -0.05
         for seed in (seed,) if ask in ("episode", "kind") else (seed, None):
@@ -286,7 +316,15 @@ nullspace.mistake(
             })
         if ask == "kind":
             kinds = [f"{x.dtype} of shape {x.shape}" for x in map(np.asarray, (start, *obs))]
-            return {"reset": kinds[0], "step": kinds[-1], "place": float(start[0])}
+            other = Point()
+            other.reset(seed=seed + 1)
+            other.step(np.ones(1))
+            return {
+                "reset": kinds[0], "step": kinds[-1], "place": float(start[0]),
+                "what reset returns beside it": info,
+                "terminated": of_truth(terminated[0]), "truncated": of_truth(truncated[0]),
+                "the next place, after another Point has moved": env.step(np.zeros(1))[0],
+            }
         return episodes if len(episodes) > 1 else episodes[0]
     """,
 )
@@ -333,13 +371,35 @@ Point.check(
     _far,
 )
 Point.check(
-    "its observations are of the kind that observation_space promises",
+    "observations, flags and info are of the kind that the text promises",
     lambda rng: _walk(rng, 1, 2, "kind"),
 )
 Point.mistake(
     "The seed never reaches the generator: call super().reset(seed=seed) first.",
     "super().reset(seed=seed)",
     "super().reset(seed=None if seed is None else seed + 1)",
+)
+Point.mistake(
+    "Success is below 0.05: a place at just 0.05 is none, < and not <=.",
+    "abs(self.x) < 0.05",
+    "abs(self.x) <= 0.05",
+)
+Point.mistake(
+    "What is known beside the observation is nothing yet: reset returns {}.",
+    "np.array([self.x], np.float32), {}",
+    'np.array([self.x], np.float32), {"is_success": False}',
+)
+Point.mistake(
+    "truncated is True or False, not a number.",
+    "False, self.t >= 50",
+    "False, int(self.t >= 50)",
+)
+Point.mistake(
+    "Keep the place and the count in self: two points at once would share yours.",
+    "self.x",
+    "Point.x",
+    "self.t",
+    "Point.t",
 )
 Point.mistake(
     "Actions may lie out of bounds: clip them to [-1, 1].",

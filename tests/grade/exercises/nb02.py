@@ -39,7 +39,8 @@ def _uniform(rng, low, high, *shape):
             for leaf, of in zip(leaves, ("mean", "log_std")):
                 gradient = torch.zeros_like(leaf) if leaf.grad is None else leaf.grad
                 found[f"gradient of the {name} for {of}"] = gradient
-        return found
+        far = squash(torch.full((1, 1), 25.0), torch.zeros(1, 1), torch.zeros(1, 1))[0]
+        return found | {"millionths that an action lacks of 1, for a mean of 25": 1e6 * (1 - far)}
     """,
 )
 def squash(mean, log_std, noise):
@@ -49,9 +50,9 @@ def squash(mean, log_std, noise):
     return torch.tanh(u), (log_normal - log_slope).sum(-1)
 
 
-def _moderate(rng):
+def _moderate(rng, *shape):
     """Means, log-deviations, of which the first row's are very low, and noise."""
-    shape = rng.integers((4, 1), (10, 6))
+    shape = shape or rng.integers((4, 1), (10, 6))
     mean, log_std, noise = (
         _uniform(rng, low, high, *shape) for low, high in ((-1, 1), (-2, -0.5), (-1, 1))
     )
@@ -89,14 +90,19 @@ def _far_out(rng):
 
 
 squash.check(
-    "actions and log-densities near the middle", lambda rng: tuple(_moderate(rng)), atol=1e-3
+    "actions and log-densities near the middle",
+    lambda rng: tuple(_moderate(rng)),
+    atol=1e-3,
+    least=lambda rng: tuple(_moderate(rng, 1, 1)),
 )
 squash.check(
     "the density over all actions adds up to 1", _one_action, atol=1e-3, verify=_adds_up_to_one
 )
 squash.check("far out, where tanh is flat, it stays finite and right", _far_out, points=2)
 squash.check(
-    "their gradients reach mean and log_std", lambda rng: (*_moderate(rng), "gradient"), atol=1e-3
+    "their gradients reach mean and log_std, and nothing is clamped",
+    lambda rng: (*_moderate(rng), "gradient"),
+    atol=1e-3,
 )
 squash.mistake(
     "The values are right, but the gradient does not pass through u: leave detach out, the noise "
@@ -197,6 +203,16 @@ squash.mistake(
     "log_std = log_std.clamp(-20, 2)\n    u = mean",
 )
 squash.mistake(
+    "Nothing is clamped: far out the action rounds to exactly 1, and may.",
+    "torch.tanh(u),",
+    "torch.tanh(u).clamp(-0.99999, 0.99999),",
+)
+squash.mistake(
+    "squeeze() drops every axis of length 1, that of a batch of one, too: leave it out.",
+    ".sum(-1)",
+    ".sum(-1).squeeze()",
+)
+squash.mistake(
     "The numbers of one action, the last dimension, are added up; you add up over the batch.",
     ".sum(-1)",
     ".sum(0)",
@@ -209,13 +225,27 @@ squash.mistake(
 )
 
 
-@exercise("2.2", "The critics' target")
+@exercise(
+    "2.2",
+    "The critics' target",
+    probe="""
+    def probe(*args):
+        *args, ask = args
+        if ask == "graph":  # as from networks; what leaves torch there may do so, for all we ask
+            try:
+                networks = (x.clone().requires_grad_() for x in args[3:6])
+                critic_target(*args[:3], *networks, *args[6:])
+            except RuntimeError:
+                pass
+        return critic_target(*args)
+    """,
+)
 def critic_target(reward, terminal, truncated, q1, q2, log_pi, alpha, gamma):
     value = torch.minimum(q1, q2) - alpha * log_pi
     return reward + gamma * (1 - terminal) * value
 
 
-def _transitions(rng, ended=None):
+def _transitions(rng, ended=None, ask="values"):
     shape = [int(n) for n in rng.integers((6, 1), (11, 4))][: rng.integers(1, 3)]
     flags = {"terminal": torch.zeros(shape), "truncated": torch.zeros(shape)}
     if ended:
@@ -225,14 +255,21 @@ def _transitions(rng, ended=None):
             flags["truncated"] = flags[ended] * (flags[ended].cumsum(0) == 1)
     reward, q1, q2, log_pi = (_normal(rng, *shape, scale=k) for k in (1, 5, 5, 2))
     alpha, gamma = float(rng.uniform(0.1, 0.8)), float(rng.uniform(0.8, 0.99))
-    return reward, flags["terminal"], flags["truncated"], q1, q2, log_pi, alpha, gamma
+    return reward, flags["terminal"], flags["truncated"], q1, q2, log_pi, alpha, gamma, ask
 
 
-critic_target.check("in the middle of an episode", _transitions, points=2)
+critic_target.check(
+    "in the middle of an episode",
+    _transitions,
+    points=2,
+    least=lambda rng: tuple(x[:1] if torch.is_tensor(x) else x for x in _transitions(rng)),
+)
 critic_target.check(
     "nothing comes after a terminal step", lambda rng: _transitions(rng, "terminal")
 )
-critic_target.check("the time limit is not an end", lambda rng: _transitions(rng, "truncated"))
+critic_target.check(
+    "the time limit is not an end", lambda rng: _transitions(rng, "truncated", "graph")
+)
 critic_target.mistake(
     "Where both flags are 1 the task has ended, and nothing comes after: `terminal` alone decides.",
     "(1 - terminal)",
@@ -318,6 +355,7 @@ critic_target.mistake(
 @exercise(
     "2.3",
     "Slow copies of the critics",
+    changes=(0,),
     probe="""
     def probe(slow, fast, tau, times, ask):
         nets = []
@@ -326,13 +364,17 @@ critic_target.mistake(
             for layer, (weight, bias) in zip(net, layers):
                 layer.load_state_dict({"weight": weight, "bias": bias})
             nets.append(net)
-        target, online = nets[0].requires_grad_(False), nets[1]
+        target, online = nets[0].requires_grad_(times == 1), nets[1]
+        for p in online.parameters():
+            p.grad = torch.ones_like(p)
         for _ in range(times):
-            follow(target, online, tau)
+            value = follow(target, online, tau)
         if ask == "gradient":
             return [p.requires_grad for p in target.parameters()]
-        net = {"target": target, "online": online}[ask]
-        return [p.detach() for p in net.parameters()]
+        weights = [p.detach() for p in {"target": target, "online": online}[ask].parameters()]
+        if ask == "target":
+            return weights
+        return {"returned": "nothing" if value is None else "something", "weights": weights}
     """,
 )
 def follow(target, online, tau):
@@ -354,7 +396,10 @@ follow.check("one step moves weights and biases", lambda rng: _two_nets(rng, 1, 
 follow.check(
     "several steps in a row", lambda rng: _two_nets(rng, int(rng.integers(2, 7)), "target")
 )
-follow.check("the online network stays as it is", lambda rng: _two_nets(rng, 3, "online"))
+follow.check(
+    "the online network stays as it is, and nothing is returned",
+    lambda rng: _two_nets(rng, 3, "online"),
+)
 follow.check("the copy stays out of the gradient", lambda rng: _two_nets(rng, 2, "gradient"))
 follow.mistake(
     "Your copy jumps most of the way: tau is the small share that comes from the online network.",
@@ -394,6 +439,22 @@ follow.mistake(
     "if True",
 )
 follow.mistake(
+    "The copy changes in place, and nothing is returned: leave the return out.",
+    "            slow.copy_((1 - tau) * slow + tau * fast)",
+    "            slow.copy_((1 - tau) * slow + tau * fast)\n    return True",
+)
+follow.mistake(
+    "You skip what needs no gradient: the copy's parameters need none, and have to move.",
+    "            slow.copy_(",
+    "            if slow.requires_grad: slow.copy_(",
+)
+follow.mistake(
+    "Shrink the old weights before you add to them: yours shrinks the share of the online network, "
+    "too.",
+    "(1 - tau) * slow + tau * fast",
+    "(1 - tau) * (slow + tau * fast)",
+)
+follow.mistake(
     "You follow the weights alone: the biases are parameters, too.",
     "            slow.copy_(",
     "            if slow.dim() > 1: slow.copy_(",
@@ -407,8 +468,6 @@ follow.mistake(
     def probe(log_alpha, log_pi, target_entropy, ask):
         log_alpha, log_pi = log_alpha.clone().requires_grad_(), log_pi.clone().requires_grad_()
         loss = temperature_loss(log_alpha, log_pi, target_entropy)
-        if not log_pi.requires_grad:
-            raise ValueError("detach_() cuts the caller's own tensor off: detach() makes a new one")
         if ask == "loss":
             return loss
         if torch.is_tensor(loss) and loss.requires_grad:
@@ -425,10 +484,10 @@ def temperature_loss(log_alpha, log_pi, target_entropy):
     return -(alpha * (log_pi.detach() + target_entropy)).mean()
 
 
-def _temperature(rng, ask, entropy=0.0, log_alpha=(-3, -0.5)):
+def _temperature(rng, ask, entropy=0.0, log_alpha=(-3, -0.5), least=24):
     """A batch whose entropy lies that far above its target, and log_alpha between these bounds."""
     target = float(rng.uniform(-6, -1))
-    log_pi = _normal(rng, int(rng.integers(24, 48)))
+    log_pi = _normal(rng, int(rng.integers(least, 2 * least)))
     log_pi = log_pi - log_pi.mean() - target - entropy
     return _uniform(rng, *log_alpha), log_pi, target, ask
 
@@ -436,6 +495,7 @@ def _temperature(rng, ask, entropy=0.0, log_alpha=(-3, -0.5)):
 temperature_loss.check(
     "the value of the loss",
     lambda rng: _temperature(rng, "loss", rng.choice([-2, 2]), log_alpha=(-6, -5.2)),
+    least=lambda rng: _temperature(rng, "loss", 2.0, least=1),
 )
 temperature_loss.check(
     "entropy below its target: a step downhill raises alpha",
@@ -479,6 +539,14 @@ temperature_loss.mistake(
     "The loss's value is right, but no gradient reaches log_alpha: alpha would never change.",
     "log_alpha.exp()",
     "log_alpha.exp().detach()",
+)
+temperature_loss.mistake(
+    "No gradient reaches log_alpha, so alpha would never change, and one does reach log_pi: the "
+    "detach stands at the wrong one.",
+    "log_alpha.exp()",
+    "log_alpha.exp().detach()",
+    "log_pi.detach()",
+    "log_pi",
 )
 temperature_loss.mistake(
     "Eq. 18 is an expectation: the mean over the batch, not its sum.", ".mean()", ".sum()"
@@ -543,7 +611,13 @@ def _policy(rng, ask):
     return weight, peaks, _normal(rng, B, S), _normal(rng, B, A), log_alpha, ask
 
 
-actor_loss.check("the value of the loss", lambda rng: _policy(rng, "loss"))
+def _one_state(rng):
+    """A state of one number, and an actor for such."""
+    weight, peaks, s, noise, *more = _policy(rng, "loss")
+    return weight[:1], peaks[:, :1], s[:1, :1], noise[:1], *more
+
+
+actor_loss.check("the value of the loss", lambda rng: _policy(rng, "loss"), least=_one_state)
 actor_loss.check("the gradient that reaches the actor", lambda rng: _policy(rng, "actor"), points=2)
 actor_loss.check("no gradient reaches the temperature", lambda rng: _policy(rng, "alpha"))
 actor_loss.mistake(
@@ -630,6 +704,11 @@ actor_loss.mistake(
     "The loss is one number, the mean over the batch; yours still has one for each state.",
     "- q).mean()",
     "- q)",
+)
+actor_loss.mistake(
+    "The noise is given, `noise`; yours draws its own.",
+    "squash(mean, log_std, noise)",
+    "squash(mean, log_std, torch.randn_like(mean))",
 )
 actor_loss.mistake(
     "The smaller value is chosen number by number; you take the critic that is lower on average.",

@@ -18,7 +18,12 @@ def _reach(rng):
     return np.linspace(0, T, rng.integers(6, 16)), T, rng.normal(size=3), rng.normal(size=3)
 
 
-minimum_jerk.check("from a place to another", _reach, points=2)
+minimum_jerk.check(
+    "from a place to another",
+    _reach,
+    points=2,
+    least=lambda rng: ((r := _reach(rng))[0][2:3], *r[1:]),
+)
 minimum_jerk.check(
     "after its time it stays at the end",
     lambda rng: (
@@ -47,6 +52,16 @@ minimum_jerk.mistake(
     "s has one number a time, (n,), a place has three: give s a second dimension, s[:, None].",
     "s[:, None] *",
     "s *",
+)
+minimum_jerk.mistake(
+    "s has one number a time, (n,), a place has three: give s a second dimension, s[:, None].",
+    "s[:, None] * (end - start)",
+    "(end - start) * s",
+)
+minimum_jerk.mistake(
+    "The coefficients are 10 for s^3 and 6 for s^5: yours are exchanged.",
+    "(10 - 15 * s + 6 * s**2)",
+    "(6 - 15 * s + 10 * s**2)",
 )
 minimum_jerk.mistake(
     "From start to end the way is end - start; yours is end alone.", "(end - start)", "end"
@@ -88,12 +103,15 @@ minimum_jerk.mistake(
     probe="""
     import pybullet as p
 
+    STEPS = 100  # 0.4 s; a cube of 0.6 m/s has stopped after 0.2
+
     def _body(body, client):
         low, high = p.getAABB(body, -1, client)
         place, _ = p.getBasePositionAndOrientation(body, client)
-        mass, friction = p.getDynamicsInfo(body, -1, client)[:2]
-        size = np.subtract(high, low)
-        return {"mass": mass, "friction": friction, "place": np.array(place), "size": size}
+        info = p.getDynamicsInfo(body, -1, client)
+        more = dict(zip(("bounce", "rolling friction", "spinning friction"), info[5:8]))
+        found = {"mass": info[0], "friction": info[1], "place": np.array(place)}
+        return found | {"size": np.subtract(high, low)} | more
 
     def _world(client):
         bodies = [p.getBodyUniqueId(i, client) for i in range(p.getNumBodies(client))]
@@ -109,7 +127,7 @@ minimum_jerk.mistake(
             for _ in range(2):  # what such a call changes there
                 p.createMultiBody(1, physicsClientId=other)
             shape, frictions = _world(other)
-            p.setGravity(0, 0, -9.81, client)
+            p.setGravity(0, 0, -5, client)
             p.setTimeStep(1 / 250, client)
             try:
                 bodies = make_push(client)
@@ -127,17 +145,21 @@ minimum_jerk.mistake(
             except (TypeError, ValueError):
                 return bodies
             if ask == "bodies":
-                return {"table": _body(table, client), "cube": _body(cube, client)}
+                gravity = p.getPhysicsEngineParameters(client)["gravityAccelerationZ"]
+                return {
+                    "table": _body(table, client), "cube": _body(cube, client),
+                    "bodies in this world": p.getNumBodies(client), "gravity in it": gravity,
+                }
             if ask == "flight":  # nothing in the way, no weight
                 p.setGravity(0, 0, 0, client)
                 p.resetBasePositionAndOrientation(cube, (0, 0, 9), (0, 0, 0, 1), client)
             p.resetBaseVelocity(cube, (speed, 0, 0), (0, 0, speed * (ask == "flight")), client)
-            for _ in range(500):
+            for _ in range(STEPS):
                 p.stepSimulation(client)
             if ask == "flight":
                 v, w = p.getBaseVelocity(cube, client)
                 return {
-                    "share of its speed after 2 s": v[0] / speed,
+                    "share of its speed after 0.4 s": v[0] / speed,
                     "share of its turning": w[2] / speed,
                 }
             end = p.getBasePositionAndOrientation(cube, client)[0]
@@ -234,6 +256,32 @@ make_push.mistake(
     "createMultiBody(0",
 )
 make_push.mistake(
+    "The world and its gravity are the caller's: leave setGravity out.",
+    "    return table, cube",
+    "    p.setGravity(0, 0, -9.81, physicsClientId=client)\n    return table, cube",
+)
+make_push.mistake(
+    "Nothing bounces: leave restitution at 0, as it is.",
+    "linearDamping=0, angularDamping=0",
+    "linearDamping=0, angularDamping=0, restitution=0.9",
+)
+make_push.mistake(
+    "A table and a cube, and nothing more: yours has a third body.",
+    "    return table, cube",
+    "    p.createMultiBody(0, box, -1, (0, 0, -1), physicsClientId=client)\n    return table, cube",
+)
+make_push.mistake(
+    "The table's top is at z = 0, not its middle, and the cube stands on it: both of yours are "
+    "half the table's thickness too high.",
+    "(0.8, 0, -0.02)",
+    "(0.8, 0, 0)",
+    "(0.53, 0, 0.025)",
+    "(0.53, 0, 0.045)",
+)
+make_push.mistake(
+    "Masses are in kilograms: 0.4, not 400.", "createMultiBody(0.4", "createMultiBody(400"
+)
+make_push.mistake(
     "Return the table first, then the cube.", "return table, cube", "return cube, table"
 )
 make_push.mistake(
@@ -270,18 +318,23 @@ def moving_share(x, take, least):
     return float(moved.mean())
 
 
-def _takes(rng, take, n):
-    """Cubes pushed for a while, forth or back; some by just `least` a frame. Sums are exact."""
+def _takes(rng, take, n, paces=(-5, -2, 2, 8)):
+    """Cubes pushed for a while, forth or back, by some `least` a frame. Sums are exact."""
     least = 2.0 ** -int(rng.integers(9, 13))
     x = np.repeat(rng.integers(1024, 1434, n), take).reshape(n, take) * least
     for row in x:
         if rng.random() < 0.8:
-            start, pace = rng.integers(take - 8), rng.choice([-5, -1, 1, 8])
+            start, pace = rng.integers(take - 8), rng.choice(paces)
             row[start:] += np.minimum(np.arange(take - start), 6) * pace * least
     return x.ravel(), take, least
 
 
-moving_share.check("a few takes", lambda rng: _takes(rng, 25, int(rng.integers(6, 12))), points=2)
+moving_share.check("a few takes", lambda rng: _takes(rng, 25, int(rng.integers(6, 12))))
+moving_share.check(
+    "a step of just `least` does not count",
+    lambda rng: _takes(rng, 24, int(rng.integers(6, 12)), (-1, 1, 8)),
+    least=lambda rng: (0.25 * np.cumsum([1, 2, 1, 0, *rng.integers(0, 3, 2)]), 6, 0.25),
+)
 moving_share.check(
     "takes of another length", lambda rng: _takes(rng, int(rng.integers(12, 20)), 20)
 )
@@ -325,6 +378,11 @@ moving_share.mistake(
 )
 moving_share.mistake("Return the share of the transitions, not their number.", ".mean()", ".sum()")
 moving_share.mistake(
+    "The share is that of the transitions, not of the takes in which anything moves.",
+    "moved.mean()",
+    "moved.any(axis=1).mean()",
+)
+moving_share.mistake(
     "You compare with the take's first frame: ask from frame to frame.",
     "np.diff(x.reshape(-1, take), axis=1)",
     "x.reshape(-1, take)[:, 1:] - x.reshape(-1, take)[:, :1]",
@@ -355,7 +413,8 @@ def _wish(rng, far):
 to_action.check("a place within one step", lambda rng: _wish(rng, 0.5))
 to_action.check("a place far away: full action, no more", lambda rng: _wish(rng, 5.0))
 to_action.mistake(
-    "An action is at most 1: divide by step first, then clip.",
+    "An action is at most 1 and at least -1, and yours is not clipped: a place far away takes full "
+    "steps.",
     "np.clip((wanted - goal) / step, -1, 1)",
     "(wanted - goal) / step",
 )

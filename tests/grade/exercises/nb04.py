@@ -27,12 +27,24 @@ def _features(rng, ask="values", scale=1.0):
     return scale * h, _tensor(rng, B, C), _tensor(rng, B, C).abs() + 0.2, ask
 
 
-adain.check("features anywhere", _features, atol=1e-4, rtol=1e-3)
+adain.check(
+    "features anywhere",
+    _features,
+    atol=1e-4,
+    rtol=1e-3,
+    least=lambda rng: ((f := _features(rng))[0][:1, :1], f[1][:1, :1], f[2][:1, :1], f[3]),
+)
 adain.check(
     "with mean 0 and std 1 only the style is gone",
     lambda rng: ((f := _features(rng))[0], 0 * f[1], torch.ones_like(f[2]), f[3]),
     atol=1e-4,
     rtol=1e-3,
+    least=lambda rng: (
+        (f := _features(rng))[0][:, :1],
+        0 * f[1][:, :1],
+        torch.ones_like(f[2][:, :1]),
+        f[3],
+    ),
 )
 adain.check(
     "channels that hardly vary: 1e-5 is added to the variance",
@@ -96,6 +108,11 @@ adain.mistake(
     "(h.var((2, 3), unbiased=False, keepdim=True) + 1e-5).sqrt()",
     "h.std((2, 3), keepdim=True) + 1e-5",
 )
+adain.mistake(
+    "squeeze() drops every axis of length 1, that of one image or one channel, too: leave it out.",
+    "h.mean((2, 3), keepdim=True)",
+    "h.mean((2, 3)).squeeze()[..., None, None]",
+)
 adain.mistake("Add 1e-5 to the variance; yours is without.", " + 1e-5", "")
 adain.mistake(
     "Each image has a look of its own: you give all of the batch that of the first.",
@@ -127,7 +144,11 @@ def _scores(rng, ask="values", most=4):
     return _tensor(rng, real, *more), _tensor(rng, made, *more), ask
 
 
-gan_losses.check("scores anywhere", _scores)
+gan_losses.check(
+    "scores anywhere",
+    _scores,
+    least=lambda rng: (_tensor(rng, 1, 1, 1, 1), _tensor(rng, 1, 1, 1, 1), "values"),
+)
 gan_losses.check(
     "a critic that is always right, with more made frames than real ones",
     lambda rng: ((s := _scores(rng))[0] * 0 + 1, torch.cat([s[1], s[0]]) * 0, s[2]),
@@ -201,6 +222,24 @@ gan_losses.mistake(
     "Return the critic's loss first, then the generator's.",
     "return ((real - 1) ** 2).mean() + (made**2).mean(), ((made - 1) ** 2).mean()",
     "return ((made - 1) ** 2).mean(), ((real - 1) ** 2).mean() + (made**2).mean()",
+)
+gan_losses.mistake(
+    "The targets are swapped in both losses: real is 1 and made is 0 to the critic, and the "
+    "generator pulls to 1.",
+    "((real - 1) ** 2).mean() + (made**2).mean(), ((made - 1) ** 2).mean()",
+    "(real**2).mean() + ((made - 1) ** 2).mean(), (made**2).mean()",
+)
+gan_losses.mistake(
+    "In Eq. 1 the generator minimises what the critic maximises; in squares it has a target of its "
+    "own: it pulls the made scores to 1.",
+    ", ((made - 1) ** 2).mean()",
+    ", -((real - 1) ** 2).mean() - (made**2).mean()",
+)
+gan_losses.mistake(
+    "In Eq. 1 the generator minimises what the critic maximises; in squares it has a target of its "
+    "own: it pulls the made scores to 1.",
+    ", ((made - 1) ** 2).mean()",
+    ", -(made**2).mean()",
 )
 gan_losses.mistake(
     "The critic has to judge both kinds; yours never sees a real frame.",
@@ -341,6 +380,16 @@ reconstructions.mistake(
     'decode["y"](c_x, s_y)) - c_y',
 )
 reconstructions.mistake(
+    "That is Eq. 3 of domain y: for x it is c_x that goes into G_Y with s_y and is read back.",
+    'content["y"](decode["y"](c_x, s_y)) - c_x',
+    'content["x"](decode["x"](c_y, s_x)) - c_y',
+)
+reconstructions.mistake(
+    "Eq. 4: what G_X has made is an x, so its style is read by x's encoder.",
+    'style["x"](decode["x"](c_y, s_x))',
+    'style["y"](decode["x"](c_y, s_x))',
+)
+reconstructions.mistake(
     "Eq. 4 compares the style that was read back with s_x; yours compares it with y's.",
     '(decode["x"](c_y, s_x)) - s_x',
     '(decode["x"](c_y, s_x)) - s_y',
@@ -387,7 +436,22 @@ reconstructions.mistake(
 )
 
 
-@exercise("4.4", "All of it (Eq. 5)")
+@exercise(
+    "4.4",
+    "All of it (Eq. 5)",
+    probe="""
+    def probe(L, lam_image, lam_content, lam_style, ask):
+        if ask == "value":
+            return munit_loss(L, lam_image, lam_content, lam_style)
+        L = {name: loss.clone().requires_grad_() for name, loss in L.items()}
+        out = munit_loss(L, lam_image, lam_content, lam_style)
+        grads = [None] * len(L)
+        if torch.is_tensor(out) and out.requires_grad:
+            grads = torch.autograd.grad(out.sum(), [*L.values()], allow_unused=True)
+        none = torch.zeros((), dtype=torch.float64)
+        return {f"the gradient for {k}": none if g is None else g for k, g in zip(L, grads)}
+    """,
+)
 def munit_loss(L, lam_image, lam_content, lam_style):
     return (
         L["gan_x"] + L["gan_y"]
@@ -397,10 +461,12 @@ def munit_loss(L, lam_image, lam_content, lam_style):
     )  # fmt: skip
 
 
-def _losses(rng):
+def _losses(rng, ask="value"):
     names = [f"{kind}_{domain}" for kind in ("gan", "image", "content", "style") for domain in "xy"]
-    return {str(n): torch.tensor(rng.uniform(0.1, 2)) for n in rng.permutation(names)}, *(
-        float(rng.uniform(0.2, 10)) for _ in range(3)
+    return (
+        {str(n): torch.tensor(rng.uniform(0.1, 2)) for n in rng.permutation(names)},
+        *(float(rng.uniform(0.2, 10)) for _ in range(3)),
+        ask,
     )
 
 
@@ -418,7 +484,30 @@ munit_loss.mistake(
     "y's losses are part of it: you take x's style loss twice.", 'L["style_y"]', 'L["style_x"]'
 )
 munit_loss.check(
-    "with all weights 0 the game is left", lambda rng: (_losses(rng)[0], 0.0, 0.0, 0.0)
+    "with all weights 0 the game is left", lambda rng: (_losses(rng)[0], 0.0, 0.0, 0.0, "value")
+)
+munit_loss.check("its gradient reaches every loss", lambda rng: _losses(rng, "gradient"))
+munit_loss.mistake(
+    "The value is right, but no gradient leaves your function, and nothing would be trained: no "
+    "float, no item, no detach.",
+    "return (",
+    "L = {name: loss.detach() for name, loss in L.items()}\n    return (",
+)
+munit_loss.mistake("y plays, too: your sum has no gan_y.", ' + L["gan_y"]', "")
+munit_loss.mistake("x plays, too: your sum has no gan_x.", 'L["gan_x"] + ', "")
+munit_loss.mistake(
+    "Losses add up; you average the two domains, the game's, too.",
+    "    return (",
+    "    L = {name: loss / 2 for name, loss in L.items()}\n    return (",
+)
+munit_loss.mistake(
+    "Losses add up; you average the two domains.",
+    '(L["image_x"] + L["image_y"])',
+    '(L["image_x"] + L["image_y"]) / 2',
+    '(L["content_x"] + L["content_y"])',
+    '(L["content_x"] + L["content_y"]) / 2',
+    '(L["style_x"] + L["style_y"])',
+    '(L["style_x"] + L["style_y"]) / 2',
 )
 munit_loss.mistake(
     "Both domains play: you add the losses of one.",

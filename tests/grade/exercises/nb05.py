@@ -10,11 +10,11 @@ def _tensor(rng, *shape, scale=1.0):
     return torch.from_numpy(np.float32(scale * rng.normal(size=shape)))
 
 
-def _map(rng):
-    """B, K, h and w of heat maps that are no squares."""
+def _map(rng, square=False):
+    """B, K, h and w of heat maps."""
     B, K = (int(n) for n in rng.integers((2, 2), (4, 6)))
     h, w = (int(n) for n in rng.choice(np.arange(4, 13), 2, replace=False))
-    return B, K, h, w
+    return B, K, h, h if square else w
 
 
 def _peaks(rng):
@@ -40,12 +40,18 @@ soft_argmax.check("a clear peak is found where it is", lambda rng: (_peaks(rng),
 soft_argmax.check(
     "several things share the probability",
     lambda rng: (_tensor(rng, *_map(rng), scale=2), "values"),
+    least=lambda rng: (_tensor(rng, *_map(rng), scale=2)[:1, :1], "values"),
 )
 soft_argmax.check(
-    "logits as large as 200", lambda rng: (_tensor(rng, *_map(rng), scale=200), "values")
+    "logits as large as 200", lambda rng: (_tensor(rng, *_map(rng, True), scale=200), "values")
 )
 soft_argmax.check(
     "it has a gradient, unlike an argmax", lambda rng: (_tensor(rng, *_map(rng)), "gradient")
+)
+# Both raise the same, and both are right where a map is a square.
+EXCHANGED = (
+    "A map has h rows and w columns. Yours exchanges them somewhere, and is right for squares "
+    "alone: see whether the view is (B, K, h, w), and whether y's centres are made from h."
 )
 soft_argmax.mistake(
     "The values are right, but no gradient leaves your function, and the detector would not learn: "
@@ -144,6 +150,21 @@ soft_argmax.mistake(
     "(logits.flatten(2).exp() / logits.flatten(2).exp().sum(-1, keepdim=True))",
 )
 soft_argmax.mistake(
+    "One softmax over all cells, then sums over rows or columns: two softmaxes, one along each "
+    "axis, are blind to where both agree.",
+    "(p.sum(2) * x).sum(-1), (p.sum(3) * y).sum(-1)",
+    "(logits.mean(2).softmax(-1) * x).sum(-1), (logits.mean(3).softmax(-1) * y).sum(-1)",
+)
+soft_argmax.mistake(
+    EXCHANGED, "(2 * torch.arange(h) + 1) / h - 1", "(2 * torch.arange(w) + 1) / w - 1"
+)
+soft_argmax.mistake(EXCHANGED, ".view(logits.shape)", ".view(*logits.shape[:2], w, h)")
+soft_argmax.mistake(
+    "squeeze() drops every axis of length 1, that of one image or one keypoint, too: leave it out.",
+    "(p.sum(3) * y).sum(-1)], -1)",
+    "(p.sum(3) * y).sum(-1)], -1).squeeze()",
+)
+soft_argmax.mistake(
     "One softmax over all cells, then sums over rows or columns: yours adds logits up before.",
     "(p.sum(2) * x).sum(-1), (p.sum(3) * y).sum(-1)",
     "(logits.sum(2).softmax(-1) * x).sum(-1), (logits.sum(3).softmax(-1) * y).sum(-1)",
@@ -169,7 +190,11 @@ def _points(rng, least=0.1, K=None, ask="values"):
     return torch.from_numpy(np.float32(z)), sigma, size, ask
 
 
-heat_map.check("one keypoint", lambda rng: _points(rng, K=1))
+heat_map.check(
+    "one keypoint",
+    lambda rng: _points(rng, K=1),
+    least=lambda rng: ((p := _points(rng))[0][:1, :1], *p[1:]),
+)
 heat_map.check("keypoints anywhere", lambda rng: _points(rng, 0.2))
 heat_map.check(
     "several on one spot: no value above 1",
@@ -264,6 +289,11 @@ heat_map.mistake(
     "h.amax(1, keepdim=True)",
 )
 heat_map.mistake(
+    "squeeze() drops every axis of length 1, that of one image, too: leave it out.",
+    "1 - (1 - h).prod(1, keepdim=True)",
+    "1 - (1 - h).prod(1).squeeze().unsqueeze(-3)",
+)
+heat_map.mistake(
     "Keep a dimension of size 1 for the channels, so that H multiplies features of any number of "
     "them.",
     "prod(1, keepdim=True)",
@@ -271,7 +301,7 @@ heat_map.mistake(
 )
 
 
-@exercise("5.3", "Transport (Eq. 6)", probe=gradients("transport", phi_y=1, h_y=3))
+@exercise("5.3", "Transport (Eq. 6)", probe=gradients("transport", graph=(0, 2), phi_y=1, h_y=3))
 def transport(phi_x, phi_y, h_x, h_y):
     phi_x, h_x = phi_x.detach(), h_x.detach()
     return (1 - h_x) * (1 - h_y) * phi_x + h_y * phi_y
@@ -283,7 +313,11 @@ def _features(rng, ask="values"):
     return _tensor(rng, B, C, *size), _tensor(rng, B, C, *size), *h, ask
 
 
-transport.check("features and maps anywhere", _features)
+transport.check(
+    "features and maps anywhere",
+    _features,
+    least=lambda rng: (*(x[:1, :1] for x in _features(rng)[:4]), "values"),
+)
 transport.check(
     "where neither frame has a keypoint, the source stays",
     lambda rng: (*(f := _features(rng))[:2], 0 * f[2], 0 * f[3], f[4]),
@@ -388,7 +422,11 @@ def _images(rng, ask="values"):
     return _tensor(rng, B, 3, H, W), _tensor(rng, B, 3, H, W), _tensor(rng, 1, 3, H, W), ask
 
 
-loss.check("images anywhere", _images)
+loss.check(
+    "images anywhere",
+    _images,
+    least=lambda rng: ((i := _images(rng))[0][:1], i[1][:1], *i[2:]),
+)
 loss.check(
     "a perfect picture costs nothing", lambda rng: ((y := _images(rng))[1], y[1].clone(), *y[2:])
 )
@@ -486,14 +524,19 @@ def r2(z, truth):
     return 1 - ((A[half:] @ W - held) ** 2).sum() / ((held - held.mean()) ** 2).sum()
 
 
-def _follows(rng, noise=0.02, least=30):
-    T, K = 2 * int(rng.integers(least, least + 15)), int(rng.integers(2, 6))
+def _follows(rng, noise=0.02, least=30, K=None):
+    T, K = 2 * int(rng.integers(least, least + 15)), K or int(rng.integers(2, 6))
     z = rng.normal(size=(T, K, 2))
     return z, 40 + z.reshape(T, -1) @ rng.normal(0, 5, 2 * K) + rng.normal(0, 50 * noise, T)
 
 
 r2.check("keypoints that follow, with jitter", _follows, atol=1e-3)
-r2.check("keypoints that follow exactly", lambda rng: _follows(rng, 0), atol=1e-3)
+r2.check(
+    "keypoints that follow exactly",
+    lambda rng: _follows(rng, 0),
+    atol=1e-3,
+    least=lambda rng: _follows(rng, 0, K=1),
+)
 r2.check(
     "keypoints that know nothing",
     lambda rng: ((z := _follows(rng)[0]), rng.normal(size=len(z))),
@@ -571,6 +614,19 @@ r2.mistake(
     "Divide the errors and the spread by the same number; np.var with ddof=1 has one less.",
     "((held - held.mean()) ** 2).sum()",
     "(((held - held.mean()) ** 2).sum() * len(held) / (len(held) - 1))",
+)
+r2.mistake(
+    "You judge on the first half, to which you fitted: judge on the second.",
+    "held = truth[half:]",
+    "held = truth[:half]",
+    "((A[half:] @ W",
+    "((A[:half] @ W",
+)
+r2.mistake(
+    "A frame's 2K numbers are neighbours in z, so a row is z.reshape(len(z), -1): yours mixes the "
+    "frames.",
+    "z.reshape(len(z), -1)",
+    "z.reshape(-1, len(z)).T",
 )
 r2.mistake(
     "You fit to x alone: each keypoint has two coordinates, and both belong to it.",

@@ -20,7 +20,11 @@ def r1(z, z_E):
     return -distances.min()
 
 
-r1.check("keypoints anywhere", lambda rng: (rng.normal(size=(z := _any_walk(rng))[0].shape), z))
+r1.check(
+    "keypoints anywhere",
+    lambda rng: (rng.normal(size=(z := _any_walk(rng))[0].shape), z),
+    least=lambda rng: (rng.normal(size=(1, 2)), _walk(rng, 2, 1)),
+)
 r1.check(
     "at a frame of the demonstration it is 0",
     lambda rng: ((z := _any_walk(rng))[rng.integers(len(z) - 1)], z),
@@ -134,7 +138,11 @@ def _homewards(rng):
     return z, z + z_E[0] - z_E[-1] + rng.normal(size=z.shape) * 0.2, z_E
 
 
-r2.check("any step, no matter where", _homewards)
+r2.check(
+    "any step, no matter where",
+    _homewards,
+    least=lambda rng: (*rng.normal(size=(2, 1, 2)), _walk(rng, 2, 1)),
+)
 r2.check(
     "a step of the demonstration, made elsewhere, earns 0",
     lambda rng: ((z := _any_walk(rng))[q := rng.integers(len(z) - 2)] + 3, z[q + 1] + 3, z),
@@ -226,15 +234,28 @@ def episode_return(z, z_E, lam1, lam2):
     return total
 
 
-def _episode(rng, *weights):
-    K, T, N = (int(n) for n in rng.integers((2, 6, 8), (7, 18, 22)))
+def _near_the_end(rng):
+    """Three frames near the end of a demonstration that is longer and goes on and on."""
+    z_E = _walk(rng, 21, 2) + np.linspace(0, 9, 21)[:, None, None]
+    return z_E[-4:-1] + rng.normal(0, 0.05, (3, 2, 2)), z_E, 0.5, 2.0
+
+
+def _episode(rng, *weights, shorter=False):
+    """An episode and a demonstration, which is shorter or of any length."""
+    K, T = (int(n) for n in rng.integers((2, 8), (7, 18)))
+    N = int(rng.integers(5, T if shorter else 22))
     return _walk(rng, T, K), _walk(rng, N, K), *weights
 
 
-episode_return.check("a random episode", lambda rng: _episode(rng, 1.0, 1.0))
+episode_return.check(
+    "a random episode",
+    lambda rng: _episode(rng, 1.0, 1.0, shorter=True),
+    least=lambda rng: (_walk(rng, 2, 1), _walk(rng, 2, 1), 1.0, 1.0),
+)
 episode_return.check(
     "other weights",
     lambda rng: _episode(rng, float(rng.uniform(0.1, 0.8)), float(rng.uniform(1.5, 3))),
+    least=_near_the_end,
 )
 episode_return.mistake(
     "z_{t+1} is the robot's next frame, z[t + 1]: r2 judges its own step.",
@@ -301,6 +322,16 @@ episode_return.mistake(
     "return total / (len(z) - 1)",
 )
 episode_return.mistake(
+    "r_1 asks the whole video, every p: yours ends where the episode does.",
+    "r1(z[t], z_E)",
+    "r1(z[t], z_E[: len(z)])",
+)
+episode_return.mistake(
+    "Each pair shares a frame with the next: T frames make T - 1 pairs; yours do not overlap.",
+    "range(len(z) - 1)",
+    "range(0, len(z) - 1, 2)",
+)
+episode_return.mistake(
     "The robot's episode has T frames, z; you walk over those of the demonstration.",
     "range(len(z) - 1)",
     "range(min(len(z), len(z_E)) - 1)",
@@ -338,7 +369,7 @@ def _rest(rng):
     return np.repeat(rng.normal(size=(1, 4, 2)), rng.integers(3, 12), axis=0)
 
 
-trim.check("a demonstration with pauses", _with_pauses)
+trim.check("a demonstration with pauses", _with_pauses, least=lambda rng: (_walk(rng, 2, 1), 0.5))
 trim.check(
     "slow motion is kept where it adds up",
     lambda rng: (_slow(rng), rng.uniform(0.15, 0.4)),
@@ -411,7 +442,21 @@ trim.mistake(
     "z[kept[-1]]",
     "z[i - 1]",
 )
+trim.mistake(
+    "The last frame stays, even if it is near the one before it.",
+    "    for i in range(1, len(z) - 1):",
+    "    for i in range(1, len(z)):",
+    "kept + [len(z) - 1]",
+    "kept",
+)
 trim.mistake("The last frame is the goal: keep it always.", "kept + [len(z) - 1]", "kept")
+trim.mistake(
+    "The last frame stays beside what was kept before, however near; yours throws its neighbour "
+    "out.",
+    "    return z[kept + [len(z) - 1]]",
+    "    if len(kept) > 1 and np.linalg.norm(z[-1] - z[kept[-1]]) < least:\n        kept.pop()\n"
+    "    return z[kept + [len(z) - 1]]",
+)
 trim.mistake("You keep what rests and cut what moves.", ">= least", "< least")
 trim.mistake(
     "Your last frame is there twice: the rule has kept it already, and you add it once more.",
@@ -451,6 +496,7 @@ timed_r1.check(
         z,
         int(rng.integers(len(z) - 2)),
     ),
+    least=lambda rng: (rng.normal(size=(1, 2)), rng.normal(size=(1, 1, 2)), 3),
 )
 timed_r1.check(
     "at t = N - 1 its end has just passed",
