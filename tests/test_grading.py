@@ -18,7 +18,6 @@ import time
 from pathlib import Path
 from xml.etree import ElementTree
 
-import numpy as np
 import pytest
 
 import tests.grade.__main__ as grading
