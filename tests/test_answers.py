@@ -402,6 +402,24 @@ PICTURES = {
 }  # fmt: skip
 
 
+# Sizes that cannot be 1, or where nothing is left to do: pictures' heights and widths, and how long
+# a video, a track or a take is.
+MORE_THAN_ONE = {
+    ("3.3", "x", -1), ("4.1", "h", -1), ("4.1", "h", -2), ("5.1", "logits", -1),
+    ("5.1", "logits", -2), *((id, "z_E", -3) for id in ("6.1", "6.2", "6.3")), ("6.3", "z", -3),
+    ("6.4", "z", -3), ("7.3", "x", -1), ("7.4", "x", -1), ("12.1", "times", -1),
+    *((id, "video", axis) for id in ("8.2", "8.3") for axis in (-2, -3, -4)), ("8.3", "mask", -1),
+    ("8.3", "mask", -2), ("12.1", "path", -2), ("12.2", "times", -1), ("12.2", "tip", -2),
+    ("12.4", "path", -2), ("13.2", "paths", -3), ("13.4", "d_E", -2),
+    *(("13.1", name, axis) for name in ("there", "back") for axis in (-2, -3)),
+    *(("11.3", name, axis) for name in ("goals", "others") for axis in (-1, -2)),
+    ("11.3", "share", -1), ("11.3", "partner", -1), ("11.4", "x", -1), ("11.4", "x", -2),
+    *(("4.3", name, axis) for name in "xy" for axis in (-1, -2)),
+    *(("5.3", n, axis) for n in ("phi_x", "phi_y", "h_x", "h_y") for axis in (-1, -2)),
+    *(("5.4", name, axis) for name in ("y_hat", "y", "median") for axis in (-1, -2)),
+}  # fmt: skip
+
+
 @pytest.mark.parametrize("id", PICTURES)
 def test_pictures_are_higher_than_wide_and_wider_than_high(id):
     """Or height and width could be exchanged."""
@@ -411,7 +429,7 @@ def test_pictures_are_higher_than_wide_and_wider_than_high(id):
 
 
 @pytest.mark.parametrize("id", FUNCTIONS)
-def test_every_size_and_every_whole_number_varies_and_is_odd_and_even(id):
+def test_every_size_and_every_whole_number_varies_and_is_odd_and_even_and_sizes_are_one(id):
     exercise, seen = ALL[id], {}
     names = parameters(exercise)
     inner = exercise.source.replace(f"def {exercise.name}(", "def _answer(", 1)
@@ -446,3 +464,5 @@ def test_every_size_and_every_whole_number_varies_and_is_odd_and_even(id):
             assert len(values) > 1, (what, values)
             if what[2] != "a float":
                 assert {v % 2 for v in values} == {0, 1}, (what, values)
+            if isinstance(what[2], int) and what not in MORE_THAN_ONE:
+                assert 1 in values, (what, values)

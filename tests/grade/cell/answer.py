@@ -321,13 +321,13 @@ class Watched:
 
 
 def state(x) -> dict:
-    """What an answer has to leave as it is of an argument, by kinds: whether tensors in it have a
-    gradient, a network's mode, numbers, and gradients that have been summed up."""
+    """What an answer has to leave as it is of an argument, by kinds: numbers, whether tensors in
+    it have a gradient, a network's mode, and gradients that have been summed up."""
     found = list(_tensors(x))
     return {
+        "values": [wire.encode(part) for part in (x, *found)],
         "graph": [(t.requires_grad, t.is_leaf) for t in found],
         "mode": [part.training for part in x.modules()] if hasattr(x, "modules") else [],
-        "values": [wire.encode(part) for part in (x, *found)],
         "grad": [wire.encode(t.grad if t.is_leaf else None) for t in found],
     }
 
@@ -368,7 +368,7 @@ def ask(probe, watched: Watched, request: bytes, catch=Exception):
     try:
         value = probe(*args)
     except catch as e:
-        return raised(e), "", e
+        return raised(e), watched.said, e  # the probe may raise at what has been changed
     if trains and not torch.is_grad_enabled():
         torch.set_grad_enabled(True)
         why = "it leaves autograd switched off; `with torch.no_grad():` switches it on again"

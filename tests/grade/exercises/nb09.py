@@ -181,7 +181,7 @@ def _seen(rng, K=5):
     return rng.normal(size=(3, K, 2)), rng.normal(size=(K, 2)), float(rng.uniform())
 
 
-observe.check("five keypoints", _seen)
+observe.check("five keypoints", _seen, least=lambda rng: _seen(rng, 1))
 observe.check("any number of them", lambda rng: _seen(rng, 2 * int(rng.integers(1, 5))))
 observe.mistake(
     "The second step is missing: how it moved in the step before.",
@@ -298,7 +298,9 @@ def _videos(rng, least, most):
 learn_by_watching.check(
     "the reward follows the translated video", lambda rng: _videos(rng, 5, 12), points=2
 )
-learn_by_watching.check("videos of any length", lambda rng: _videos(rng, 2, 40))
+learn_by_watching.check(
+    "videos of any length", lambda rng: _videos(rng, 2, 40), least=lambda rng: _videos(rng, 1, 2)
+)
 learn_by_watching.mistake(
     "You look for keypoints on the human's frames; the detector knows robots: translate first.",
     "detect(translate(demo))",

@@ -224,7 +224,11 @@ def _seeds(rng, n=5, m=5):
     return a, b, rng.integers(0, n, (draws, n)), rng.integers(0, m, (draws, m))
 
 
-difference.check("five seeds each", _seeds)
+difference.check(
+    "five seeds each",
+    _seeds,
+    least=lambda rng: ((s := _seeds(rng, 1, 1))[0], s[1], s[2][:1], s[3][:1]),
+)
 difference.check(
     "more seeds of one than of the other",
     lambda rng: _seeds(rng, int(rng.integers(3, 5)), int(rng.integers(6, 9))),
@@ -361,7 +365,11 @@ def _several(rng):
     return idle, random, expert
 
 
-verdict.check("a fair task", lambda rng: _task(rng, random=rng.uniform(0, 0.045)))
+verdict.check(
+    "a fair task",
+    lambda rng: _task(rng, random=rng.uniform(0, 0.045)),
+    least=lambda rng: (np.zeros(1, bool), np.zeros(1, bool), np.ones(1, bool)),
+)
 verdict.check(
     "one that idling solves now and then",
     lambda rng: (_one(rng, (t := _task(rng))[0], True), *t[1:]),

@@ -30,7 +30,12 @@ def _to_the_last(rng):
     return times, rng.uniform(0, 300, (T, int(rng.integers(2, 4)))), fps
 
 
-resample.check("frames that come unevenly", _filmed, points=2)
+resample.check(
+    "frames that come unevenly",
+    _filmed,
+    points=2,
+    least=lambda rng: ((f := _filmed(rng))[0], f[1][:, :1], f[2]),
+)
 resample.check(
     "a piece that does not begin at 0", lambda rng: _filmed(rng, float(rng.uniform(1, 9)))
 )

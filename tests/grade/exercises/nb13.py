@@ -44,7 +44,12 @@ def _flows(rng, leaves=0.0):
     return points, there, back, 5 * unit
 
 
-there_and_back.check("some come home, some do not", _flows, points=2)
+there_and_back.check(
+    "some come home, some do not",
+    _flows,
+    points=2,
+    least=lambda rng: ((f := _flows(rng))[0][:1], *f[1:]),
+)
 there_and_back.check("some leave the picture", lambda rng: _flows(rng, 0.5), points=2)
 there_and_back.mistake(
     "A picture is asked for its row first: flow[y, x]. You ask flow[x, y].",
@@ -209,7 +214,11 @@ def _on_the_brink(rng, T, still, gone):
 object_points.check(
     "a hand, a table and an object", lambda rng: _paths(rng, "hand", "table"), points=2
 )
-object_points.check("points that were lost", lambda rng: _paths(rng, "lost", "table"))
+object_points.check(
+    "points that were lost",
+    lambda rng: _paths(rng, "lost", "table"),
+    least=lambda rng: ((p := _paths(rng, "lost"))[0][:, :1], p[1][:1], *p[2:]),
+)
 object_points.check("a lamp that swings back", lambda rng: _paths(rng, "lamp", "hand"))
 object_points.check("points that hardly move", lambda rng: _paths(rng, "slow", "late", "hand"))
 object_points.check(
@@ -339,7 +348,11 @@ def _seen(rng, lost, dragged=0):
 
 
 lost_and_found.check("some points are lost", lambda rng: _seen(rng, int(rng.integers(2, 5))))
-lost_and_found.check("none is lost", lambda rng: _seen(rng, 0))
+lost_and_found.check(
+    "none is lost",
+    lambda rng: _seen(rng, 0),
+    least=lambda rng: ((s := _seen(rng, 0))[0][:1], s[1][:1], s[2][:1], s[3]),
+)
 lost_and_found.check("a gripper drags one along", lambda rng: _seen(rng, 3, dragged=1), points=2)
 
 
