@@ -100,8 +100,7 @@ FORMS = {
         "        a.data.mul_(1 - tau).add_(b.data, alpha=tau)",
         "def follow(target, online, tau):\n    new = online.state_dict()\n    "
         "target.load_state_dict(\n"
-        "        {k: (1 - tau) * v + tau * new[k] for k, v in target.state_dict().items()})\n"
-        "    return target",
+        "        {k: (1 - tau) * v + tau * new[k] for k, v in target.state_dict().items()})",
         "def follow(target, online, tau):\n    pairs = list(zip(target.parameters(), "
         "online.parameters()))\n    for a, b in pairs:\n"
         "        a.data = a.data + tau * (b.detach() - a.data)",
@@ -221,8 +220,8 @@ FORMS = {
         "        total += L['gan_' + d] + lam_image * L['image_' + d]\n"
         "        total += lam_content * L['content_' + d] + lam_style * L['style_' + d]\n"
         "    return total",
-        "def munit_loss(L, i, c, s):\n    v = np.array([L[k + d] for d in ('_x', '_y') for k in "
-        "('gan', 'image', 'content', 'style')])\n    return np.dot(v, [1, i, c, s] * 2)",
+        "def munit_loss(L, i, c, s):\n    v = torch.stack([L[k + d] for d in ('_x', '_y') for k in "
+        "('gan', 'image', 'content', 'style')])\n    return v @ v.new_tensor([1, i, c, s] * 2)",
     ],
     "5.1": [
         "def soft_argmax(logits):\n    B, K, h, w = logits.shape\n"

@@ -146,8 +146,8 @@ foreground.mistake(
     "video = video.astype(float).mean(-1, keepdims=True)",
 )
 foreground.mistake(
-    "With an even number of frames torch.median takes the lower of the two in the middle; "
-    "np.median their mean.",
+    "Of an even number of frames you take the lower of the two in the middle, as torch.median "
+    "does; np.median takes their mean.",
     "np.median(video, axis=0)",
     "torch.from_numpy(video).median(0).values.numpy()",
 )
@@ -170,6 +170,12 @@ share_inside.check("any region", _masked, points=2)
 share_inside.check(
     "the whole picture holds all of it",
     lambda rng: (v := _video(rng), np.ones(v.shape[1:3], bool)),
+)
+share_inside.mistake(
+    "Square each colour's difference, then add up: yours adds the colours first, and what gets "
+    "redder and less green cancels.",
+    "(np.diff(video.astype(float), axis=0) ** 2).sum((0, 3))",
+    "(np.diff(video.astype(float).sum(3), axis=0) ** 2).sum(0)",
 )
 share_inside.mistake(
     "You return the energy inside; the share is that divided by all of it.",

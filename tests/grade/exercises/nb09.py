@@ -84,6 +84,16 @@ make_drawer.check(
 )
 make_drawer.check("it stops where it is shut", lambda rng: _push(rng, 15, 25, 1.0), atol=5e-3)
 make_drawer.mistake(
+    "The motor has no force of yours, and Bullet's is too strong for any push: force=friction.",
+    ", force=friction",
+    "",
+)
+make_drawer.mistake(
+    "The drawer slides along x, axis (1, 0, 0); the mug's hinge, (0, 0, 1), stands upright.",
+    "linkJointAxis=[(1, 0, 0)]",
+    "linkJointAxis=[(0, 0, 1)]",
+)
+make_drawer.mistake(
     "It gives way to any push: dry friction is a velocity motor that wants 0 and has at most that "
     "force.",
     "force=friction",
@@ -163,8 +173,8 @@ make_drawer.mistake(
     "(0.025, 0.04, 0.02)",
 )
 make_drawer.mistake(
-    "It runs through its end, braked: PyBullet forgets limits that come without jointDamping in "
-    "the same call, and keeps its own damping of the joint.",
+    "It runs through its end: PyBullet forgets the limits unless jointLowerLimit, jointUpperLimit "
+    "and jointDamping come in one call.",
     "        jointDamping=0,\n",
     "",
 )
@@ -380,9 +390,14 @@ evaluate.check("ten episodes", _episodes)
 evaluate.check("any number of episodes", lambda rng: _episodes(rng, int(rng.integers(15, 45))))
 evaluate.mistake("The number of episodes is n, not always 10.", "range(n)", "range(10)")
 evaluate.mistake(
-    "The first test seed is 1,000,000 itself: yours begin one later.",
+    "The n test seeds are 1,000,000 to 1,000,000 + n - 1: yours run on by one.",
     "1_000_000 + i",
     "1_000_001 + i",
+)
+evaluate.mistake(
+    "The n test seeds are 1,000,000 to 1,000,000 + n - 1: yours run on by one.",
+    "range(n)",
+    "range(n + 1)",
 )
 evaluate.mistake(
     "Return how many were solved; you stop at the first.",

@@ -52,6 +52,7 @@ def _between(got, args):
 wilson.check("any number of episodes", _count)
 wilson.check("ten of ten, and none of ten", lambda rng: (int(rng.choice([0, 10])), 10))
 wilson.check("at the very ends it stays between 0 and 1", _extremes, trials=1, verify=_between)
+wilson.mistake("z is 1.96, not 2.", "z = 1.96", "z = 2")
 wilson.mistake(
     "Rounding leads out of 0 to 1 at times: cut it off, max(0, ...) and min(1, ...).",
     "max(0.0, centre - half), min(1.0, centre + half)",

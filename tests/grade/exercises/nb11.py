@@ -171,6 +171,8 @@ cyclegan_loss.mistake(
             return both
         if not torch.is_tensor(shown):
             raise ValueError(f"what is shown is a {type(shown).__name__}: stack it to one tensor")
+        if torch.is_tensor(pool):
+            raise ValueError("the new pool is one tensor: return a list of them, to add to")
         if ask == "gradient":
             tied = [v.requires_grad for v in (shown, *pool)]
             return {"shown": shown, "tied to the generator: what is shown, of the pool": tied}
@@ -223,6 +225,11 @@ swap.check(
     lambda rng: _full(rng, least=2, coins=(0.1, 0.4), places=int(rng.integers(1, 3))),
 )
 swap.check("nothing it returns is tied to the generator", lambda rng: _full(rng, ask="gradient"))
+swap.mistake(
+    "Below 0.5 the coin asks for an exchange; yours exchanges above.",
+    "coin < 0.5",
+    "coin > 0.5",
+)
 swap.mistake(
     "The values are right, but the images are still tied to the generator, and the critics' step "
     "would change it: detach them first.",

@@ -78,7 +78,8 @@ resample.mistake(
     "int((times[-1] - times[0]) * fps) + 2",
 )
 resample.mistake(
-    "Your last point is after the last frame wherever a step is half over by then: round down.",
+    "Your last point may be after the last frame: a step that is not over by then does not count, "
+    "so round down, neither up nor to the nearest.",
     "int((times[-1] - times[0]) * fps) + 1",
     "round((times[-1] - times[0]) * fps) + 1",
 )
@@ -123,14 +124,15 @@ def _cut_film(rng, frames, slow=None, waits=True, gap=None):
     """Times, the tip's path and the highest speed of a hand, px/s; a cut between the pieces.
 
     frames: how many each piece has. slow: the piece whose frames come rarely, and which so lasts
-    longest. waits: in a longer piece, after one frame, nothing comes for over a second. gap: the
-    piece after which nothing comes for longer than any piece lasts.
+    longest, while the tip goes farthest in the first. waits: in a longer piece, after one frame,
+    nothing comes for over a second. gap: the piece after which nothing comes for longer than any
+    piece lasts.
     """
     most = float(rng.uniform(60, 300))
     steps, shares = [], []
     for k, n in enumerate(frames):
         step = rng.uniform(0.03, 0.06, n) * (8 if k == slow else 1)
-        share = rng.uniform(0.3, 0.95, n)
+        share = rng.uniform(0.3, 0.95, n) * (0.01 if k and slow else 1)
         if waits and n > 3:
             step[1] = rng.uniform(1.2, 1.6)
             share[1] = 0.95
@@ -180,6 +182,12 @@ longest_piece.mistake(
 longest_piece.check(
     "few frames that last long against many that do not",
     lambda rng: _cut_film(rng, [5, int(rng.integers(9, 12)), 6], slow=2, waits=False),
+)
+longest_piece.mistake(
+    "The longest piece is the one that lasts longest, in seconds; yours is the one in which the "
+    "tip goes farthest.",
+    "times[piece[1] - 1] - times[piece[0]]",
+    "np.linalg.norm(np.diff(tip[slice(*piece)], axis=0), axis=1).sum()",
 )
 longest_piece.mistake(
     "The longest piece is the one that lasts longest, in seconds; you count its frames.",

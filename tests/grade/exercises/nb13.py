@@ -51,6 +51,66 @@ there_and_back.check(
     least=lambda rng: ((f := _flows(rng))[0][:1], *f[1:]),
 )
 there_and_back.check("some leave the picture", lambda rng: _flows(rng, 0.5), points=2)
+
+
+def _at_the_rim(rng):
+    """Points that come to just inside and just outside of the picture, at all four of its sides.
+
+    All would come home by the flow at the pixel of the rim next to them.
+    """
+    size = rng.permutation([rng.integers(24, 30), rng.integers(31, 40)])  # width, height
+    there, back = (rng.integers(-192, 193, (*size[::-1], 2)) / 64 for _ in range(2))
+    points = []
+    for axis, end in enumerate(size):
+        for k, place in enumerate((-0.9, -0.4, 0, end - 1, end - 0.6, end - 0.4, end)):
+            to = np.full(2, 4.0 + k)
+            to[axis] = place
+            p = to.copy()
+            p[axis] = 3 if place < 3 else end - 4
+            (x, y), (i, j) = p.astype(int), np.round(to).astype(int).clip(0, size - 1)
+            there[y, x], back[j, i] = to - p, p - to
+            points.append((x, y))
+    return np.array(points)[rng.permutation(len(points))], there, back, 0.5
+
+
+there_and_back.check("some come to the picture's rim", _at_the_rim)
+there_and_back.mistake(
+    "It is the nearest pixel that lies inside or not: round first, and ask the rounded numbers.",
+    "(x >= 0) & (x < width) & (y >= 0) & (y < height)",
+    "(to >= 0).all(1) & (to < (width, height)).all(1)",
+)
+there_and_back.mistake(
+    "It is the nearest pixel that lies inside or not: round first, and ask the rounded numbers.",
+    "(x >= 0) & (x < width) & (y >= 0) & (y < height)",
+    "(to >= 0).all(1) & (to <= (width - 1, height - 1)).all(1)",
+)
+there_and_back.mistake(
+    "A picture is asked for its row first, in both flows: flow[y, x]. You ask flow[x, y].",
+    "there[points[:, 1], points[:, 0]]",
+    "there[points[:, 0].clip(0, height - 1), points[:, 1].clip(0, width - 1)]",
+    "back[y.clip(0, height - 1), x.clip(0, width - 1)]",
+    "back[x.clip(0, height - 1), y.clip(0, width - 1)]",
+)
+there_and_back.mistake(
+    "A picture is asked for its row first, in both flows: flow[y, x]. You ask flow[x, y].",
+    "back[y.clip(0, height - 1), x.clip(0, width - 1)]",
+    "back[x.clip(0, height - 1), y.clip(0, width - 1)]",
+)
+there_and_back.mistake(
+    "astype(int) cuts towards 0, so that -0.9 + 0.5 becomes pixel 0: round with np.round.",
+    "np.round(to)",
+    "(to + 0.5)",
+)
+there_and_back.mistake(
+    "Pixels run from 0 to width - 1 and height - 1, both of them inside: < width, and >= 0.",
+    "(x < width) & (y >= 0) & (y < height)",
+    "(x <= width) & (y >= 0) & (y <= height)",
+)
+there_and_back.mistake(
+    "Pixels run from 0 to width - 1 and height - 1, both of them inside: < width, and >= 0.",
+    "(x >= 0) & (x < width) & (y >= 0)",
+    "(x > 0) & (x < width) & (y > 0)",
+)
 there_and_back.mistake(
     "A picture is asked for its row first: flow[y, x]. You ask flow[x, y].",
     "there[points[:, 1], points[:, 0]]",
@@ -348,6 +408,12 @@ def _seen(rng, lost, dragged=0):
 
 
 lost_and_found.check("some points are lost", lambda rng: _seen(rng, int(rng.integers(2, 5))))
+lost_and_found.check("most points are lost", lambda rng: _seen(rng, 6))
+lost_and_found.mistake(
+    "Those that were kept decide, be they few; only with none of them does the displacement stay.",
+    "kept.any()",
+    "kept.mean() > 0.5",
+)
 lost_and_found.check(
     "none is lost",
     lambda rng: _seen(rng, 0),
@@ -578,4 +644,14 @@ reward.mistake(
     "The length is cut off at 2 L, and not each of its coordinates.",
     "min(np.linalg.norm(x), 2 * L) / L",
     "np.linalg.norm(np.clip(x, -2 * L, 2 * L)) / L",
+)
+reward.mistake(
+    "The approach is weighed by where the demonstration is next, d_E of t + 1; yours is that of t.",
+    "np.linalg.norm(goal) / L) * length",
+    "np.linalg.norm(now) / L) * length",
+)
+reward.mistake(
+    "L is the largest length of a displacement, of x and y together; yours is the largest number.",
+    "np.linalg.norm(d_E, axis=1).max()",
+    "np.abs(d_E).max()",
 )
