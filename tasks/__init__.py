@@ -40,6 +40,11 @@ def id_of(name: str) -> str:
     return f"LbW-{name.capitalize()}-v0"
 
 
+def moves_object(name: str) -> bool:
+    """Whether the task is to move something; reach is not, there nothing is touched."""
+    return getattr(module(name), name.capitalize()).CONTACT is not None
+
+
 def bare(name: str, **options: Any) -> TaskEnv:
     """The task's environment without Gymnasium's wrappers: its arm, scene and truth at hand."""
     return cast("TaskEnv", gym.make(id_of(name), **options).unwrapped)

@@ -127,6 +127,13 @@ def test_what_is_missing_is_printed_in_its_order_and_the_order_said(tmp_path, ca
     assert capsys.readouterr().err == ""  # nothing to say of one kind alone
 
 
+def test_object_tracks_are_run_where_something_is_to_be_moved(tmp_path, capsys):
+    table.main(["--print", "--tracks", "--seeds", "1", "--out", str(tmp_path)])
+    lines = [line for line in capsys.readouterr().out.splitlines() if "--method" in line]
+    assert [line.split()[3] for line in lines] == ["push", "slide", "coffee", "drawer"]
+    assert lines[0].endswith(f"--out {tmp_path / 'push-0-tracks'} --episodes 10 --method tracks")
+
+
 def test_the_ablation_prints_what_it_lacks(tmp_path, capsys):
     ablation.main(["--print", "--seeds", "1", "--out", str(tmp_path)])
     lines = capsys.readouterr().out.splitlines()

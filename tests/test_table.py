@@ -82,6 +82,19 @@ def test_the_rivals_stand_above_lbw_as_in_the_paper(runs):
     assert lbw.startswith("| LbW | 1 human video | 97 % (83-99) / 100 % | 80 % (63-90) / 80 % |")
 
 
+def test_object_tracks_stand_below_lbw_and_beside_no_figure_of_the_papers(runs):
+    for seed in range(3):
+        finish(batch.folder(runs, "push", seed, "tracks"), 4 * seed)
+        finish(batch.folder(runs, "slide", seed, "tracks"), 5)
+    *_, two, single = table.table(runs, jobs=1, tracks=True).split("\n\n")
+    _, _, lbw, tracks = two.splitlines()
+    assert lbw.startswith("| LbW | 1 human video | 97 % (83-99) / 100 % |")
+    # 12 of 30: Wilson 24.6 to 57.7 %; 15 of 30: 33.2 to 66.8 %
+    rates = "40 % (25-58) | 50 % (33-67)"
+    assert tracks == f"| Object tracks | 1 human video | {rates} | 0.6 h in 6 runs |"
+    assert "| Object tracks | push | 0/10, 4/10, 8/10 | 10,000 | 0.3 h |" in single
+
+
 def test_a_rival_is_run_alone_with_perception_of_its_own(tmp_path, monkeypatch):
     started = []
 

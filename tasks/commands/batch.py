@@ -24,6 +24,7 @@ ALONE = {
     "classifier": ["--method", "classifier"],
     "avid": ["--method", "avid"],
     "avid-motion": ["--method", "avid", "--set", "motion=1"],
+    "tracks": ["--method", "tracks"],  # which has no networks but the policy's
     # Three times the steps that reach and push have.
     "classifier-long": ["--method", "classifier", "--set", "policy_steps=9000"],
     # Other numbers of human videos than 1.

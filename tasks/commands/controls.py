@@ -29,7 +29,6 @@ from tasks.commands.table import METHODS, markdown
 from tasks.world import SIZE, TaskEnv
 
 JITTERS = (JITTER, 0.01, 0.02, 0.04)  # m
-TRACKS = "Object tracks"
 TRIAL_SEED, TRIALS = 2_000_000, 10  # starts on which blind robots are chosen
 LIBRARY = 50  # episodes of the policy, from which the robot that looks once takes one
 BLIND = (  # what has no eyes at all
@@ -252,7 +251,7 @@ def settings(run: Path) -> dict[str, Any]:
 def method_of(run: Path) -> str:
     """The name of the method whose run is in that folder. Raises InputError for LbW's own."""
     method = settings(run)["method"]
-    names = {rival: name for rival, (name, _) in METHODS.items()} | {"tracks": TRACKS}
+    names = {rival: name for rival, (name, _) in METHODS.items()}
     if method not in names:
         raise InputError(f"--beside {run}: no run of a rival is there.")
     return names[method]

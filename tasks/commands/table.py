@@ -1,8 +1,8 @@
 """The results of all tasks: what is missing is run first, what is finished is not repeated.
 
 `python -m tasks table`: LbW's row of the paper's Table II, five tasks and three seeds, mended and
-literal reward; with `--rivals` the whole table. Out: Markdown and JSON in `runs/table/`, where
-every run has a folder of its own.
+literal reward; with `--rivals` the whole table, with `--tracks` what came after the paper beside
+it. Out: Markdown and JSON in `runs/table/`, where every run has a folder of its own.
 """
 
 from __future__ import annotations
@@ -23,10 +23,11 @@ from tasks.commands.job import TEST_EPISODES
 SEEDS = 3
 RIVAL_SEEDS = 2
 RIVALS = ("classifier", "avid")
-METHODS = {  # name and number of expert videos, as in Table II
+METHODS = {  # name and number of expert videos, as in Table II, and one that came after it
     "classifier": ("Classifier reward", "35 robot videos"),
     "avid": ("AVID-m", "15 human videos"),
     "": ("LbW", "1 human video"),
+    "tracks": ("Object tracks", "1 human video"),
 }
 TABLE_II = {  # %
     "classifier": {"reach": 100, "push": 100, "slide": 30, "coffee": 50, "drawer": 70},
@@ -68,6 +69,7 @@ def parser(command: str = "table") -> Parser:
     )
     if command == "table":
         p.add_argument("--rivals", action="store_true", help="the paper's rivals too, two seeds")
+        p.add_argument("--tracks", action="store_true", help="object tracks too, after the paper")
     return p
 
 
@@ -75,9 +77,11 @@ def main(argv: list[str]) -> None:
     """Print the table, after running what is missing. Raises InputError if a run fails."""
     args = parser().read(argv)
     if args.print:
-        print_missing(args.out, wanted(counts(args.seeds, args.rivals)), args.episodes)
+        count = counts(args.seeds, args.rivals, args.tracks)
+        print_missing(args.out, wanted(count), args.episodes)
     else:
-        print(table(args.out, args.jobs, args.episodes, args.seeds, args.rivals, args.ray))
+        how = {"rivals": args.rivals, "tracks": args.tracks, "ray": args.ray}
+        print(table(args.out, args.jobs, args.episodes, args.seeds, **how))
 
 
 def rate(rows: list[Row]) -> tuple[float, float, float]:
@@ -114,15 +118,20 @@ def r_squared(row: Row, where: str) -> str:
     return " / ".join("-" if s is None else f"{s:.3f}" for s in scores)
 
 
-def counts(seeds: int, rivals: bool) -> dict[str, int]:
+def counts(seeds: int, rivals: bool, tracks: bool) -> dict[str, int]:
     """How many runs of each task the table has, by their change."""
-    count = {"": seeds, "literal": seeds}
+    count = {"": seeds, "literal": seeds} | ({"tracks": seeds} if tracks else {})
     return count | {rival: min(seeds, RIVAL_SEEDS) for rival in RIVALS if rivals}
+
+
+def tasks_of(change: str) -> list[str]:
+    """The tasks that runs of this change can learn: object tracks need an object that moves."""
+    return [t for t in tasks.TASKS if change != "tracks" or tasks.moves_object(t)]
 
 
 def wanted(count: dict[str, int]) -> list[Job]:
     """The runs of the table."""
-    return [(t, s, c) for c, n in count.items() for t in tasks.TASKS for s in range(n)]
+    return [(t, s, c) for c, n in count.items() for t in tasks_of(c) for s in range(n)]
 
 
 def table(
@@ -132,14 +141,16 @@ def table(
     seeds: int = SEEDS,
     rivals: bool = False,
     ray: bool = False,
+    tracks: bool = False,
 ) -> str:
     """Run what is missing, write table.md and table.json, and return the Markdown."""
-    count = counts(seeds, rivals)
+    count = counts(seeds, rivals, tracks)
     run_missing(out, wanted(count), jobs, episodes, ray)
     runs = {
         (t, c): [read(out, t, s, c) for s in range(n)]
         for t in tasks.TASKS
         for c, n in count.items()
+        if t in tasks_of(c)
     }
     text = markdown(
         HEAD, [success(task, runs[task, ""], runs[task, "literal"]) for task in tasks.TASKS]
@@ -152,25 +163,31 @@ def table(
             for r in runs[task, ""]
         ],
     )
-    if rivals:
-        text += "\n" + table_two(runs) + "\n" + order(runs) + "\n" + every_run(runs)
+    if rivals or tracks:
+        where = order(runs) + "\n" if rivals else ""
+        text += f"\n{table_two(runs)}\n{where}{every_run(runs)}"
     write_atomic(out / "table.md", text)
     write_rows(out / "table.json", runs)
     return text
 
 
 def table_two(runs: dict[tuple[str, str], list[Row]]) -> str:
-    """The paper's Table II: methods, tasks, success rates, ours before the paper's, and hours."""
+    """The paper's Table II: methods, tasks, success rates, ours before the paper's, and hours.
+
+    Below it, what was run of methods that came later, with no figure of the paper's.
+    """
+
+    def cell(change, task):
+        some = runs.get((task, change))
+        theirs = f" / {TABLE_II[change][task]} %" if change in TABLE_II else ""
+        return percent(some) + theirs if some else "-"
+
     rows = []
     for change, (name, videos) in METHODS.items():
-        cells = [
-            f"{percent(runs[t, change])} / {TABLE_II[change][t]} %"
-            if runs.get((t, change))
-            else "-"
-            for t in tasks.TASKS
-        ]
         done = [r for (_, c), some in runs.items() if c == change for r in some]
-        rows.append([name, videos, *cells, f"{hours(done)} in {len(done)} runs"])
+        if done:
+            cells = [cell(change, task) for task in tasks.TASKS]
+            rows.append([name, videos, *cells, f"{hours(done)} in {len(done)} runs"])
     return markdown(["method", "expert videos", *tasks.TASKS, "time"], rows)
 
 
@@ -179,7 +196,7 @@ def order(runs: dict[tuple[str, str], list[Row]]) -> str:
     lines = []
     ours_is = {1: "above", 0: "not to be told from", -1: "below"}
     theirs_is = {1: "above it", 0: "equal", -1: "below it"}
-    for task, (a, b) in itertools.product(tasks.TASKS, itertools.combinations(METHODS, 2)):
+    for task, (a, b) in itertools.product(tasks.TASKS, itertools.combinations(TABLE_II, 2)):
         (_, low_a, high_a), (_, low_b, high_b) = (rate(runs[task, change]) for change in (a, b))
         ours = (low_a > high_b) - (low_b > high_a)
         theirs = int(np.sign(TABLE_II[a][task] - TABLE_II[b][task]))
@@ -196,8 +213,8 @@ def every_run(runs: dict[tuple[str, str], list[Row]]) -> str:
     rows = []
     for change, (name, _) in METHODS.items():
         for task in tasks.TASKS:
-            some = runs[task, change]
-            rows.append([name, task, each(some), f"{some[0]['steps']:,}", hours(some)])
+            if some := runs.get((task, change)):
+                rows.append([name, task, each(some), f"{some[0]['steps']:,}", hours(some)])
     return markdown(["method", "task", "by seed", "environment steps", "time"], rows)
 
 
