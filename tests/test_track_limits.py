@@ -17,11 +17,11 @@ def test_an_arm_stands_out_by_more_than_eight_grey_levels_in_some_colour(levels,
 
 
 def test_the_arms_pixels_count_by_their_nearness_and_by_how_clearly_they_stand_out():
-    """Two columns at the picture's edge, 1.5 pixels apart in their distance: 1 to 1 / e."""
+    """Two columns at the picture's edge, one pixel apart in their distance, of 3."""
     frame = WALL.copy()
     frame[0, 40], frame[0, 41] = 180, 140  # 40 levels are as clear as can be
     place = np.array([38.0, 0])  # 2 and 3 pixels off
-    share = np.exp(-1 / 1.5)
+    share = np.exp(-1 / 3)
     x, y = tracks.arm_near(frame, WALL, NOTHING, place)
     assert (x, y) == pytest.approx(((40 + 41 * share) / (1 + share), 0))
     frame[0, 40] = 120  # half as clear
