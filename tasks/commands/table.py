@@ -124,9 +124,9 @@ def counts(seeds: int, rivals: bool, tracks: bool) -> dict[str, int]:
     return count | {rival: min(seeds, RIVAL_SEEDS) for rival in RIVALS if rivals}
 
 
-def tasks_of(change: str) -> list[str]:
+def tasks_of(change: str) -> tuple[str, ...]:
     """The tasks that runs of this change can learn: object tracks need an object that moves."""
-    return [t for t in tasks.TASKS if change != "tracks" or tasks.moves_object(t)]
+    return tuple(t for t in tasks.TASKS if change != "tracks" or tasks.moves_object(t))
 
 
 def wanted(count: dict[str, int]) -> list[Job]:
