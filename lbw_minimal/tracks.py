@@ -123,7 +123,7 @@ class Demonstration:
     corner: np.ndarray  # (2,) of the patch in the first frame
     patch: np.ndarray  # (h, w, 3) uint8, the object in the first frame
     mask: np.ndarray  # (h, w) uint8, 1 where the patch shows it
-    behind: np.ndarray  # (2,) in the patch: half an object behind the side it moves away from
+    behind: np.ndarray  # (2,) in the patch: a whole object behind the side it moves away from
 
 
 def watch(demo: np.ndarray) -> Demonstration:
@@ -145,7 +145,7 @@ def watch(demo: np.ndarray) -> Demonstration:
     pixels = np.argwhere(mask)[:, ::-1]
     middle, way = pixels.mean(axis=0), d[-1] / np.linalg.norm(d[-1])
     # At the side itself a hand on top of the object would be as near as one that stands behind it.
-    behind = middle + 2 * ((pixels - middle) @ way).min() * way
+    behind = middle + 3 * ((pixels - middle) @ way).min() * way
     return Demonstration(d, points[own], np.array([x, y]), patch, mask, behind)
 
 
