@@ -3,8 +3,8 @@
     track the object -> reward its displacement and the approach to it -> soft actor-critic
 
 In: one demonstration, an environment of RGB frames, and a film of the robot moving at random. Out:
-a policy. d_t (2,) is the object's displacement from where it began, g_t (2,) the way from the side
-that it is to be pushed from to the arm, both in pixels. L is the demonstration's longest
+a policy. d_t (2,) is the object's displacement from where it began, g_t (2,) the way from a place
+behind the object, one object's width off, to the arm, both in pixels. L is the demonstration's longest
 displacement, s = L / (the robot's way to where the demonstration left the object). With
 |x|_L = min(|x|, 2 L) / L,
 
@@ -14,8 +14,9 @@ displacement, s = L / (the robot's way to where the demonstration left the objec
     r3  = -(1 - |d^E_{t+1}| / L) |g_{t+1}|_L                  and the arm is at it while it must go.
 
 r1 and r2 are Eq. 9 and 10 with the clock of `MendedReward`, for the object alone. r3 is new: an arm
-that touches nothing moves nothing, and r1 does not tell it where to go. Nothing here says how the
-arm is to get there.
+that touches nothing moves nothing, and r1 does not tell it where to go. The place is not at the
+object itself: there a hand that came down on top would be as near as one behind it, and stay.
+Nothing here says how the arm is to get there.
 """
 
 from __future__ import annotations
