@@ -34,6 +34,7 @@ COLOUR = 30  # grey levels between two things, of 255; shading makes less
 SHARE = 0.3  # of a film, in which the background is seen; at 0.5 the arm covers some for longer
 ARM = 8  # grey levels between arm and background; a gripper hardly stands out from a wall
 NEAR = 3.0  # pixels over which the arm's nearest pixels count; with 1.5 its speed is half noise
+HAND = 4.2  # pixels, about the width of a hand, robot's or human's
 FLOW: dict[str, Any] = {"winSize": (WINDOW, WINDOW), "maxLevel": 2, "criteria": (3, 30, 0.01)}
 
 
@@ -123,7 +124,7 @@ class Demonstration:
     corner: np.ndarray  # (2,) of the patch in the first frame
     patch: np.ndarray  # (h, w, 3) uint8, the object in the first frame
     mask: np.ndarray  # (h, w) uint8, 1 where the patch shows it
-    behind: np.ndarray  # (2,) in the patch: a whole object behind the side it moves away from
+    behind: np.ndarray  # (2,) in the patch: where an arm stands that is to push it, see `watch`
 
 
 def watch(demo: np.ndarray) -> Demonstration:
@@ -144,8 +145,10 @@ def watch(demo: np.ndarray) -> Demonstration:
     patch, mask = demo[0, y : y + h, x : x + w], mask[y : y + h, x : x + w]
     pixels = np.argwhere(mask)[:, ::-1]
     middle, way = pixels.mean(axis=0), d[-1] / np.linalg.norm(d[-1])
-    # At the side itself a hand on top of the object would be as near as one that stands behind it.
-    behind = middle + 3 * ((pixels - middle) @ way).min() * way
+    # Behind the object by half of its length: at its side itself a hand on top of it would be as
+    # near as one behind it. Not farther than a hand is wide: what pushes would be away from there.
+    side = ((pixels - middle) @ way).min()
+    behind = middle + (side - min(-side, HAND)) * way
     return Demonstration(d, points[own], np.array([x, y]), patch, mask, behind)
 
 
