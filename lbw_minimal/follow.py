@@ -5,8 +5,8 @@
 In: one demonstration, an environment of RGB frames, and a film of the robot moving at random. Out:
 a policy. d_t (2,) is the object's displacement from where it began, g_t (2,) the way from a place
 behind the object, where a hand stands that is to push it, to the arm, both in pixels. L is the
-demonstration's longest displacement, s = L / (the robot's way to where the demonstration left the object). With
-|x|_L = min(|x|, 2 L) / L,
+demonstration's longest displacement, s = L / (the robot's way to where the demonstration left the
+object). With |x|_L = min(|x|, 2 L) / L,
 
     r_t = lambda_1 r1 + lambda_2 r2 + lambda_3 r3
     r1  = -|s d_{t+1} - d^E_{t+1}|_L                          the object is where it should be,
