@@ -81,13 +81,21 @@ def test_one_point_alone_is_no_object():
         tracks.watch(frames)
 
 
-def test_the_objects_pixels_and_a_place_a_hand_behind_it_are_found():
-    frames, _ = ways(pace=(2.0, 0.0))
-    shown = tracks.watch(frames)
+def test_the_objects_pixels_are_found():
+    shown = tracks.watch(ways(pace=(2.0, 0.0))[0])
     x, y = shown.corner
     assert abs(x - 30) <= 1 and abs(y - 40) <= 1
     assert shown.mask.sum() > 0.8 * SIDE * SIDE
-    np.testing.assert_allclose(shown.corner + shown.behind, (25.8, 44.5), atol=1)  # 30 - 4.2
+
+
+@pytest.mark.parametrize(("hand", "place"), [(20.0, 25.5), (2.0, 28.0)])
+def test_an_arm_is_to_stand_half_an_object_behind_it_and_no_more_than_a_hand(
+    hand, place, monkeypatch
+):
+    """The square's left side is at 30 and its middle at 34.5; it goes to the right."""
+    monkeypatch.setattr(tracks, "HAND", hand)
+    shown = tracks.watch(ways(pace=(2.0, 0.0))[0])
+    np.testing.assert_allclose(shown.corner + shown.behind, (place, 44.5), atol=0.8)
 
 
 def test_an_object_of_the_backgrounds_colour_is_as_large_as_flow_looks_about_its_points():
