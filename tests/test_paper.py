@@ -27,6 +27,7 @@ def test_the_runs_are_those_of_the_tables_and_each_is_asked_for_once(tmp_path):
     assert count == {
         "": 15, "wide": 15, "classifier": 10, "avid": 10, "classifier-long": 2, "avid-long": 2,
         "avid-motion": 1, "videos-5": 1, "videos-15": 1, "avid-1": 1, "avid-5": 1,
+        "tracks": 12,  # reach has no object
     }  # fmt: skip
     smoke = paper.wanted(plan(tmp_path, seeds=1, fast=True))
     assert len(smoke) == 15 and {s for _, s, _ in smoke} == {0}

@@ -290,23 +290,3 @@ def test_runs_with_moved_starts_are_as_good_as_their_table_says():
         lines.append([task, f"{wins}/{n}", f"{low}-{high} %"])
     text = table.markdown(["task", "success", "95 % interval"], lines)
     assert text in (RESULTS / "README.md").read_text()
-
-
-def test_object_tracks_are_as_good_as_their_tables_say():
-    """Seed by seed, and by jitter beside LbW's policies."""
-    readme = (RESULTS / "README.md").read_text()
-    moved = json.loads((RESULTS / "tracks" / "jitter.json").read_text())
-    for task in ("push", "slide", "coffee", "drawer"):
-        runs = [read(RESULTS / "tracks" / f"{task}-{s}" / "metrics.json") for s in range(3)]
-        assert all(run["settings"]["method"] == "tracks" for run in runs)
-        by_seed = [(sum(e["success"] for e in r["episodes"]), len(r["episodes"])) for r in runs]
-        wins, n = map(sum, zip(*by_seed, strict=True))
-        low, high = (round(100 * bound) for bound in wilson(wins, n))
-        cells = ", ".join(f"{w}/{m}" for w, m in by_seed)
-        assert f"| {task} | {100 * wins / n:.0f} % ({low}-{high}) | {cells} |" in readme
-        lbw = read(RESULTS / "paper" / "controls" / f"{task}.json")["success"]
-        both = [
-            f"{100 * found['wins'] // found['episodes']} % / {lbw[jitter]['the policy']} %"
-            for jitter, found in moved[task].items()
-        ]
-        assert len(both) == 4 and f"| {task} | {' | '.join(both)} |" in readme

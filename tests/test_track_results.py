@@ -1,0 +1,62 @@
+"""What the results' page says of object tracks, against the runs that are there."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tasks.commands import batch, table
+
+RESULTS = Path(__file__).parents[1] / "solutions" / "results"
+
+
+def read(path):
+    return json.loads(path.read_text())
+
+
+def tracks_rows(task):
+    """A task's lines in the tables of object tracks: by seed, and over start jitter; LbW beside."""
+    ours, lbw = (
+        [batch.read(RESULTS / "paper" / "runs", task, seed, change) for seed in range(3)]
+        for change in ("tracks", "")
+    )
+    sides = [f(some) for some in (ours, lbw) for f in (table.percent, table.each, steps_of)]
+    yield [task, *sides]
+    seen = read(RESULTS / "paper" / "controls" / f"{task}.json")["success"]
+    for jitter, wins in read(RESULTS / "tracks" / "jitter.json")[task].items():
+        rows = [{"wins": n, "episodes": 100} for n in wins]
+        beside = table.percent([{"wins": seen[jitter]["the policy"], "episodes": 100}])
+        each = ", ".join(map(str, wins))
+        yield [task, f"{1000 * float(jitter):g} mm", table.percent(rows), each, beside]
+
+
+def steps_of(rows):
+    return f"{rows[0]['steps']:,}"
+
+
+@pytest.mark.parametrize("task", ["push", "slide", "coffee", "drawer"])
+def test_object_tracks_are_as_good_as_their_tables_say(task):
+    readme = (RESULTS / "README.md").read_text()
+    for row in tracks_rows(task):
+        assert f"| {' | '.join(row)} |" in readme
+    moved = read(RESULTS / "tracks" / "jitter.json")[task]
+    runs = [batch.read(RESULTS / "paper" / "runs", task, seed, "tracks") for seed in range(3)]
+    assert moved["0.005"] == [run["wins"] for run in runs]
+
+
+def test_forms_of_the_tracks_reward_are_as_good_as_their_table_says():
+    """Runs of the form before, seed by seed, and of the present one."""
+    readme = (RESULTS / "README.md").read_text()
+
+    def won(path):
+        episodes = read(path / "metrics.json")["episodes"]
+        return f"{sum(e['success'] for e in episodes)}/{len(episodes)}"
+
+    side = RESULTS / "tracks" / "side"
+    cells = [
+        ", ".join(won(side / f"{task}-{seed}") for seed in range(3))
+        for task in ("push", "slide", "coffee", "drawer")
+    ]
+    assert f"| to the object's side | {' | '.join(cells)} |" in readme
+    for path in (RESULTS / "tracks" / "hand").glob("*"):
+        assert f"{won(path)} (seed {path.name[-1]})" in readme
