@@ -15,7 +15,7 @@ object). With |x|_L = min(|x|, 2 L) / L,
 
 r1 and r2 are Eq. 9 and 10 with the clock of `MendedReward`, for the object alone. r3 is new: an arm
 that touches nothing moves nothing, and r1 does not tell it where to go. The place is not at the
-object itself: there a hand that came down on top would be as near as one behind it, and stay.
+object itself: to that a hand on top would be about as near as one behind it, and stay.
 Nothing here says how the arm is to get there.
 """
 

@@ -145,8 +145,8 @@ def watch(demo: np.ndarray) -> Demonstration:
     patch, mask = demo[0, y : y + h, x : x + w], mask[y : y + h, x : x + w]
     pixels = np.argwhere(mask)[:, ::-1]
     middle, way = pixels.mean(axis=0), d[-1] / np.linalg.norm(d[-1])
-    # Behind the object by half of its length: at its side itself a hand on top of it would be as
-    # near as one behind it. Not farther than a hand is wide: what pushes would be away from there.
+    # Half an object behind it: to its side itself a hand on top would be about as near as one
+    # behind. And no farther than a hand is wide, since what pushes would be away from there.
     side = ((pixels - middle) @ way).min()
     behind = middle + (side - min(-side, HAND)) * way
     return Demonstration(d, points[own], np.array([x, y]), patch, mask, behind)
