@@ -10,8 +10,8 @@ T = 60
 SEEDS = range(40)
 
 
-def story(kind, seed):
-    return drawings._story(np.random.default_rng(seed), kind, T)
+def story(kind, seed, frames=T):
+    return drawings._story(np.random.default_rng(seed), kind, frames)
 
 
 def ways(told):
@@ -107,7 +107,7 @@ def test_who_pushes_or_carries_stays_where_it_touches(kind):
 def test_who_pushes_or_hits_is_behind_the_object_when_it_goes():
     for kind in ("push", "hit"):
         for seed in SEEDS:
-            told = story(kind, seed)
+            told = story(kind, seed, frames=2000)
             way, length, _ = ways(told)
             first = under_way(told)[0]
             behind = (told.object - told.tip)[first] @ way / length

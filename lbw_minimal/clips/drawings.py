@@ -24,11 +24,15 @@ HIDDEN = 0.2  # a thing of which less than this share is seen is nowhere
 # Stories and how often they are told. In the last three something is missing, and the detector has
 # to say so. In "alone" a thing moves that nobody touches.
 STORIES = {
-    "push": 0.34, "carry": 0.17, "hit": 0.12, "drawer": 0.13,
-    "reach": 0.16, "alone": 0.04, "nothing": 0.04,
+    "push": 0.32, "carry": 0.16, "hit": 0.12, "drawer": 0.13,
+    "reach": 0.19, "alone": 0.04, "nothing": 0.04,
 }  # fmt: skip
 # s at most: rest, approach, rest, move, rest, retreat, rest
 PHASES = np.array([0.25, 0.8, 0.25, 1.4, 0.4, 0.7, 0.3])
+# Some rests are long: the camera runs before anything happens and after all is over, and a hand
+# waits for a word or stays where it has pushed. At this chance for each rest, four clips in ten
+# have a long one.
+LONG, LONG_REST = 0.18, (1, 8)  # s
 Draw = Callable[[int], np.ndarray]  # a frame's number -> a layer
 
 
@@ -91,8 +95,9 @@ def _story(rng, kind, T):
     time = np.linspace(0, 1, T)[:, None]
     begin, approach, move, retreat = _phases(rng, time)
     slid = move
-    if kind == "hit":  # the object slides on, slower and slower
-        slid = 1 - (1 - np.clip((time - begin) / (1 - begin), 0, 1)) ** 2
+    if kind == "hit":  # the object slides on, slower and slower, and then rests
+        slides = (1 - begin) * rng.uniform(0.1, 1)
+        slid = 1 - (1 - np.clip((time - begin) / slides, 0, 1)) ** 2
         move = move * min(1.0, 4 / np.linalg.norm(way))
     bow = rng.uniform(0, 100) * (kind == "carry" and rng.random() < 0.3)  # lifted, put down again
     object_ = start + way * slid - np.array([0, bow]) * slid * (1 - slid)
@@ -106,10 +111,16 @@ def _story(rng, kind, T):
 def _phases(rng, time):
     """When the move begins, and how far approach, move and retreat are, 0 to 1."""
     seconds = PHASES * rng.uniform(0, 1, 7) + (0, 0.1, 0, 0.3, 0, 0.1, 0)
+    rests = [0, 2, 4, 6]
     if rng.random() < 0.25:
         seconds[:2] = 1e-3  # the clip begins with the touch
+        rests.remove(0)
     if rng.random() < 0.6:
         seconds[5:] = 1e-3  # and ends with it
+        rests.remove(6)
+    for i in rests:
+        if rng.random() < LONG:
+            seconds[i] = np.exp(rng.uniform(*np.log(LONG_REST)))
     ends = np.cumsum(seconds) / seconds.sum()
     begins = ends - seconds / seconds.sum()
     steps = (_ease((time - begins[i]) / (ends[i] - begins[i])) for i in (1, 3, 5))
@@ -242,7 +253,9 @@ def draw_clip(rng: np.random.Generator, T: int = FRAMES, kind: str | None = None
     moves, has_arm = kind not in ("reach", "nothing"), kind not in ("alone", "nothing")
     story = _story(rng, kind, T)
     if not moves:
-        story = story._replace(object=story.object[:1].repeat(T, 0))
+        # What is reached for stands where the hand gets to as often as where it comes by.
+        still = story.object[-1:] if rng.random() < 0.5 else story.object[:1]
+        story = story._replace(object=still.repeat(T, 0))
     room, ground = _room(rng, story)
     if rng.random() < 0.35:
         room = draw.over(room, _mark(rng, story))
@@ -252,6 +265,8 @@ def draw_clip(rng: np.random.Generator, T: int = FRAMES, kind: str | None = None
     bystander = _bystander(rng, T) if rng.random() < 0.12 else None
     reach = np.linalg.norm(story.tip - story.shoulder, axis=1).max()
     person = draw.Person(rng, reach) if has_arm else None
+    if person and rng.random() < 0.15:  # a sleeve that is hard to tell from the room
+        person.cloth = a_colour(rng, ground)
     exposure = rng.uniform(0, 0.25) * (rng.random() < 0.4)  # of the time from frame to frame
     in_front, shade = rng.random() < 0.5, rng.uniform(0, 0.5) * (rng.random() < 0.6)
     fall, soft = rng.normal((0, 8), 12), rng.uniform(0.5, 5)
@@ -265,7 +280,7 @@ def draw_clip(rng: np.random.Generator, T: int = FRAMES, kind: str | None = None
                 draw.smeared(layer, exposure * (path[t + 1] - path[t - 1]) / 2)
                 for layer, path in ((limb, story.tip), (thing, story.object))
             )
-        picture = picture * _lit(limb, shade, fall, soft)
+        picture = picture * _lit(np.maximum(limb, thing), shade, fall, soft)
         for layer in (limb, thing) if in_front else (thing, limb):
             picture = draw.over(picture, layer)
         pictures.append(picture)

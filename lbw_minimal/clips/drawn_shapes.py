@@ -172,6 +172,8 @@ class Person:
         self.hand, self.length = HANDS[rng.choice(list(HANDS))], rng.uniform(6, 21)
         self.flip = rng.choice([-1, 1])  # which side the thumb is on
         self.down = rng.random() < 0.45  # the hand points down, else along the arm
+        # Of a hand's length, what a camera sees that looks down on it.
+        self.seen = rng.uniform(0.5, 1) if rng.random() < 0.3 else 1.0
         self.bend, self.sway = rng.normal(0, 0.45), rng.normal(0, 0.15)  # rad
         self.skin, self.cloth = a_skin(rng), a_colour(rng)
         self.glove = a_colour(rng) if rng.random() < 0.12 else self.skin
@@ -188,8 +190,9 @@ class Person:
         self.bones = (reach + self.length) * rng.uniform(0.43, 0.86, 2)
         self.torso = rng.uniform((6, 15), (25, 50)) if rng.random() < 0.35 else None
         self.light = rng.normal(0, 0.25, 2)
-        # A tool in the hand: then its end is the tip.
-        self.tool = rng.uniform(3, 16) if rng.random() < 0.3 else 0.0
+        # A tool in the hand: then its end is the tip. Rulers and spoons are longer than hands.
+        long = rng.random() < 0.25
+        self.tool = rng.uniform(*((16, 32) if long else (3, 16))) if rng.random() < 0.3 else 0.0
         self.tool_radius, self.tool_turn = rng.uniform(0.5, 3.5), rng.normal(0, 0.5)
         self.tool_colour = a_colour(rng)
 
@@ -201,18 +204,19 @@ class Person:
         along = turned(along, self.bend + self.sway * np.sin(3 * time))
         tool = turned(along, self.tool_turn)
         end = tip - self.tool * tool
-        wrist = end - self.length * along
+        deep = self.seen * self.length
+        wrist = end - deep * along
         self._arm(layer, shoulder, self._elbow(shoulder, wrist), wrist)
         move = np.round(wrist).astype(int)
         knit = np.roll(self.knit, (move[1], move[0]), (0, 1))
         layer[..., :3] = np.minimum(layer[..., :3] * knit, layer[..., 3:])
         if self.tool:
             r, foot = self.tool_radius, tip - self.tool_radius * tool
-            stick(layer, end - 0.4 * self.length * along, foot, r, r, self.tool_colour)
+            stick(layer, end - 0.4 * deep * along, foot, r, r, self.tool_colour)
         across = np.array([-along[1], along[0]]) * self.flip
         for i, (u_a, v_a, u_b, v_b, r_a, r_b) in enumerate(self.hand):
-            a = end + self.length * (u_a * along + v_a * across)
-            b = end + self.length * (u_b * along + v_b * across)
+            a = end + deep * u_a * along + self.length * v_a * across
+            b = end + deep * u_b * along + self.length * v_b * across
             shade = self.glove * (1 - 0.05 * (i % 2))  # or fingers would melt into one
             self._limb(layer, a, b, self.length * r_a, self.length * r_b, shade)
         return layer
