@@ -224,6 +224,7 @@ def easy(rng):
 def test_a_tiny_training_on_easy_drawings_beats_chance(monkeypatch):
     monkeypatch.setattr(detector, "draw_clip", easy)
     monkeypatch.setattr(detector, "POOL", 24)
+    monkeypatch.setattr(detector, "BATCH", 8)
     model, log = detector.train(iterations=100, seed=0)
     clips = [easy(np.random.default_rng([9, i])) for i in range(8)]
     # Chance: the mean place of all clips, which is the best guess without eyes.
@@ -238,6 +239,7 @@ def test_a_tiny_training_on_easy_drawings_beats_chance(monkeypatch):
 def test_a_training_that_was_cut_off_ends_as_if_nothing_had_happened(monkeypatch, tmp_path):
     monkeypatch.setattr(detector, "draw_clip", easy)
     monkeypatch.setattr(detector, "POOL", 8)
+    monkeypatch.setattr(detector, "BATCH", 8)
 
     class Cut(Exception):
         pass
@@ -428,8 +430,8 @@ def test_a_place_is_the_mean_of_seven_by_seven_cells_about_its_peak():
 
 
 def test_batches_are_of_the_newest_clips_with_the_places_and_masks_of_the_frame_shown(monkeypatch):
-    """Every other iteration a new clip; half of the batches run backwards."""
-    drawn, clips = [], {}
+    """Two new clips an iteration; half of the clips run backwards."""
+    drawn = []
 
     def clip(rng):
         i = len(drawn)
@@ -442,11 +444,13 @@ def test_batches_are_of_the_newest_clips_with_the_places_and_masks_of_the_frame_
 
     monkeypatch.setattr(detector, "draw_clip", clip)
     monkeypatch.setattr(detector, "POOL", 9)
-    pool, rng, backwards = detector._Pool(0), np.random.default_rng(0), []
-    for step in (0, 3, 4, 11):
-        images, places, masks = pool.batch(step, rng)
-        clips = sorted(pool.clips)
-        assert clips == list(range(step // 2, step // 2 + 9)) and len(drawn) == step // 2 + 9
+    monkeypatch.setattr(detector, "BATCH", 8)
+    rng, backwards = np.random.default_rng(0), []
+    pool = detector._Pool(0, range(6), 0)
+    for step in range(6):
+        images, places, masks = pool.batch(rng, "cpu")
+        clips = [int(clip.tip[0, 0]) for clip, _ in pool.clips]
+        assert clips == list(range(2 * step, 2 * step + 9)) and len(drawn) == 2 * step + 9
         grey = ((images + 1) * 127.5).round()[:, :, 0, 0]
         for shown, (tip, thing), mask in zip(grey, places, masks, strict=True):
             i, t = tip.int().tolist()
@@ -456,6 +460,31 @@ def test_batches_are_of_the_newest_clips_with_the_places_and_masks_of_the_frame_
             backwards.append((shown[6] > shown[9]).item())
             assert {shown[6].item(), shown[9].item()} == {10 * i, 10 * i + 2}
     assert 0.2 < np.mean(backwards) < 0.8
+    assert next(pool.drawn, None) is None  # no clip is drawn for nothing
+
+
+def test_batches_are_the_same_whoever_draws_and_where_a_training_goes_on(monkeypatch):
+    monkeypatch.setattr(detector, "POOL", 9)
+    monkeypatch.setattr(detector, "BATCH", 4)
+
+    def batches(first, workers):
+        pool = detector._Pool(3, range(first, 4), workers)
+        return [pool.batch(np.random.default_rng(step), "cpu") for step in range(first, 4)]
+
+    here = batches(0, 0)
+    for others in (batches(0, 2), 2 * [None] + batches(2, 0)):
+        for batch, other in zip(here, others, strict=True):
+            for one, same in zip(batch, other or batch, strict=True):
+                assert torch.equal(one.nan_to_num(-1), same.nan_to_num(-1))
+
+
+def test_a_training_leaves_torchs_chance_alone_once_it_draws(monkeypatch):
+    """Or one that was cut off would go on with other numbers than one that was not."""
+    monkeypatch.setattr(detector, "draw_clip", easy)
+    monkeypatch.setattr(detector, "POOL", 8)
+    before = torch.get_rng_state()
+    detector._Pool(0, range(2), 0)
+    assert torch.equal(torch.get_rng_state(), before)
 
 
 def test_the_learning_rate_warms_up_holds_and_falls_over_the_last_three_quarters(monkeypatch):
@@ -463,7 +492,7 @@ def test_the_learning_rate_warms_up_holds_and_falls_over_the_last_three_quarters
     monkeypatch.setattr(detector, "draw_clip", easy)
     monkeypatch.setattr(detector, "POOL", 8)
     images = torch.zeros(8, 12, 84, 84), torch.zeros(8, 2, 2), torch.zeros(8, 2, 42, 42)
-    monkeypatch.setattr(detector._Pool, "batch", lambda pool, step, rng: images)
+    monkeypatch.setattr(detector._Pool, "batch", lambda pool, rng, device: images)
     weight = torch.nn.Parameter(torch.ones(1))
 
     class Tiny(torch.nn.Module):

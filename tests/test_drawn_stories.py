@@ -70,6 +70,31 @@ def test_rests_and_moves_last_as_long_as_in_real_clips_at_most():
     np.testing.assert_allclose(retreat[6:, 0], [0, 0.5, 1], atol=1e-9)
 
 
+class Patient:
+    """Chance that lets all last an instant but the rest of the given number, which is long."""
+
+    def __init__(self, rest):
+        self.chances = iter([0.99, 0.99, *(0.0 if i == rest else 0.99 for i in range(4))])
+
+    def uniform(self, low, high, size=None):
+        return high if size is None else np.full(size, low)
+
+    def random(self):
+        return next(self.chances)
+
+
+@pytest.mark.parametrize("rest", range(4))
+def test_people_wait_before_they_come_at_the_object_and_after_the_push_and_the_retreat(rest):
+    """Eight seconds, and half a second in which the hand comes, moves for 0.3 s, and goes."""
+    time = (np.arange(8500) / 8500)[:, None]
+    _, *steps = drawings._phases(Patient(rest), time)
+    moves = np.abs(np.gradient(np.concatenate(steps, 1), axis=0)).max(1) > 0
+    waits = np.flatnonzero(np.diff(moves))
+    before = (0, 0.1, 0.4, 0.5)[rest]  # s
+    rests = [a for a, b in zip([0, *waits], [*waits, 8500], strict=True) if b - a > 7900]
+    assert len(rests) == 1 and abs(rests[0] / 1000 - before) < 0.06
+
+
 @pytest.mark.parametrize("kind", ["push", "hit", "alone"])
 def test_an_object_goes_straight_and_never_back_from_and_to_a_place_in_the_picture(kind):
     for seed in SEEDS:
@@ -112,6 +137,12 @@ def test_who_pushes_or_hits_is_behind_the_object_when_it_goes():
             first = under_way(told)[0]
             behind = (told.object - told.tip)[first] @ way / length
             assert behind > 0 and behind < np.abs(told.half).sum() + 3
+
+
+def test_most_hit_objects_have_come_to_rest_when_the_clip_ends():
+    ends = [ways(story("hit", seed))[2] for seed in range(100)]
+    at_rest = np.array([(share[-T // 10 :] > 1 - 1e-9).all() for share in ends])
+    assert 0.5 < at_rest.mean() < 0.9  # the others still glide in the last tenth of it
 
 
 def test_a_hit_object_goes_on_ever_slower_and_the_hand_four_pixels_at_most():

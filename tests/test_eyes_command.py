@@ -16,8 +16,8 @@ def told(tmp_path, monkeypatch):
     told = []
     monkeypatch.chdir(tmp_path)
 
-    def train(iterations, seed, checkpoint):
-        told.append((iterations, seed, checkpoint.path.as_posix()))
+    def train(iterations, seed, device, workers, checkpoint):
+        told.append((iterations, seed, checkpoint.path.as_posix(), device, workers))
         checkpoint.path.write_text("cut off here")
         return SimpleNamespace(save=lambda path: path.write_text("weights")), ["row"]
 
@@ -34,10 +34,11 @@ def told(tmp_path, monkeypatch):
 
 
 def test_the_weights_that_are_shipped_are_those_that_are_measured(told, tmp_path, capsys):
-    eyes.main(["--iterations", "30", "--seed", "4", "--out", str(tmp_path / "eyes")])
+    asked_for = ["--iterations", "30", "--seed", "4", "--device", "cpu"]
+    eyes.main([*asked_for, "--out", str(tmp_path / "eyes")])
     metrics = json.loads((tmp_path / "eyes" / "metrics.json").read_text())
     asked, *measured = told
-    assert asked == (30, 4, "runs/eyes-4.checkpoint")
+    assert asked[:4] == (30, 4, "runs/eyes-4.checkpoint", "cpu")
     assert not (tmp_path / "runs" / "eyes-4.checkpoint").exists()  # it has ended
     model = "a detector of eyes: weights"
     assert measured == [("drawn", model), *(("filmed", model, task) for task in tasks.TASKS)]
@@ -70,3 +71,21 @@ def test_clips_with_marks_are_measured_where_their_folder_is_given(told, tmp_pat
     assert set(marks) < set(error) and len(marks) > 0
     assert all([("marked", "model", tmp_path / name)] in told for name in marks)
     assert set(eyes.measure("model")) == set(error) - set(marks)
+
+
+@pytest.mark.parametrize(
+    ("cores", "device", "drawers", "threads"),
+    [(1, "cpu", 0, 1), (2, "cpu", 1, 1), (8, "cpu", 1, 7), (16, "cuda", 15, 1)],
+)
+def test_on_a_cpu_one_core_draws_and_for_a_gpu_all_but_one(
+    told, tmp_path, monkeypatch, cores, device, drawers, threads
+):
+    asked = []
+    monkeypatch.setattr(eyes.os, "cpu_count", lambda: cores)
+    monkeypatch.setattr(eyes.torch, "set_num_threads", asked.append)
+    monkeypatch.setattr(eyes.torch.cuda, "get_device_name", lambda device: "a GPU")
+    monkeypatch.setattr(eyes, "pick_device", asked.append)
+    eyes.main(["--device", device, "--out", str(tmp_path)])
+    assert told[0][3:] == (device, drawers) and asked == [device, threads]
+    machine = json.loads((tmp_path / "metrics.json").read_text())["machine"]
+    assert f"{cores} cores" in machine and ("a GPU" in machine) == (device == "cuda")

@@ -13,7 +13,7 @@ from torch import nn
 
 from lbw_minimal.clips.drawn_shapes import SIZE
 
-WIDTH = 48  # channels
+WIDTH = 64  # channels
 CELLS = 42  # of the map, each way: a cell is two pixels wide
 SIGMA = 2.0  # pixels, of the Gaussian that the map is taught
 CUT = 0.05  # the chance that a place has nothing to do with that in the frame before
@@ -75,7 +75,8 @@ def target(places: torch.Tensor) -> torch.Tensor:
 
     A Gaussian about the place; all on "nowhere" where the place is nan.
     """
-    bump = torch.exp(-((middles() - places[..., None]) ** 2) / (2 * SIGMA**2))  # (B, 2, 2, 42)
+    off = middles().to(places.device) - places[..., None]
+    bump = torch.exp(-(off**2) / (2 * SIGMA**2))  # (B, 2, 2, 42)
     p = (bump[..., 1, :, None] * bump[..., 0, None, :]).flatten(2)
     p = (p / p.sum(2, keepdim=True)).nan_to_num(0.0)
     return torch.cat([p, places[..., :1].isnan().float()], 2)
@@ -88,7 +89,7 @@ def loss(
 
     A place is one cell in 1,764, too rare a hint to learn to see from: every cell of a mask is one.
     """
-    where = -(target(places).to(logits.device) * logits.log_softmax(2)).sum(2).mean()
+    where = -(target(places) * logits.log_softmax(2)).sum(2).mean()
     return where + MASK_WEIGHT * F.binary_cross_entropy_with_logits(mask_logits, masks)
 
 

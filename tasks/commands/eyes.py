@@ -8,6 +8,7 @@ The kit cannot ship those clips, only the marks: give the folder in which the cl
 from __future__ import annotations
 
 import json
+import os
 import platform
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -22,7 +23,7 @@ from lbw_minimal import video
 from lbw_minimal.clips import detector
 from lbw_minimal.clips.detector import SURE, Detector, Found
 from lbw_minimal.clips.drawings import SIZE, draw_clip
-from lbw_minimal.training import Checkpoint, InputError, write_atomic
+from lbw_minimal.training import Checkpoint, InputError, pick_device, write_atomic
 from tasks.commands import Parser, at_least, make_folder
 from tasks.world import load_recordings
 
@@ -46,6 +47,11 @@ def parser() -> Parser:
     p = Parser("eyes", "Train the detector that finds tip and object in a person's own clip.")
     p.add_argument("--iterations", type=at_least(0), default=ITERATIONS, help="of the training")
     p.add_argument("--seed", type=at_least(0), default=0, help="of the drawings and the network")
+    p.add_argument(
+        "--device",
+        default="cuda" if torch.cuda.is_available() else "cpu",
+        help="where the network learns",
+    )
     p.add_argument("--out", type=Path, default=tasks.WEIGHTS / "eyes", help="folder of the weights")
     p.add_argument("--measure", action="store_true", help="measure the weights that are there")
     p.add_argument("--clips", type=Path, help=f"folder of the real clips that {MARKS.name} marks")
@@ -56,15 +62,15 @@ def main(argv: list[str]) -> None:
     """Train, measure, write. Raises InputError for a mistake in the arguments."""
     args = parser().read(argv)
     weights, metrics_file = args.out / "eyes.safetensors", args.out / "metrics.json"
-    torch.set_num_threads(1)  # the network is small: a second thread costs more than it gains
     if args.measure:
         model = Detector.load(weights)
         metrics = (
             json.loads(metrics_file.read_text(encoding="utf-8")) if metrics_file.exists() else {}
         )
     else:
+        pick_device(args.device)  # or it is known only after minutes that there is none
         make_folder(args.out)
-        metrics = learn(args.iterations, args.seed, weights)
+        metrics = learn(args.iterations, args.seed, weights, args.device)
         model = Detector.load(weights)  # what is measured is what is shipped: half precision
     write_atomic(metrics_file, json.dumps(metrics, indent=1) + "\n")  # measuring takes minutes
     metrics.setdefault("error", {}).update(measure(model, args.clips))
@@ -74,21 +80,30 @@ def main(argv: list[str]) -> None:
             print(f"{where:24s}{what:8s}" + "".join(f"{k} {v:<8}" for k, v in row.items()))
 
 
-def learn(iterations: int, seed: int, weights: Path) -> dict[str, Any]:
-    """Train, or go on with a training that was cut off, and write the weights; returns metrics."""
+def learn(iterations: int, seed: int, weights: Path, device: str) -> dict[str, Any]:
+    """Train, or go on with a training that was cut off, and write the weights; returns metrics.
+
+    All cores are at work: on a CPU one draws and the others learn, for a GPU all but one draw.
+    """
+    cores, on_cpu = os.cpu_count() or 1, device == "cpu"
+    torch.set_num_threads(max(1, cores - 1) if on_cpu else 1)
     runs = Path("runs")
     make_folder(runs)
     checkpoint = runs / f"eyes-{seed}.checkpoint"
     kept = Checkpoint(checkpoint)
-    model, log = detector.train(iterations=iterations, seed=seed, checkpoint=kept)
+    model, log = detector.train(
+        iterations=iterations, seed=seed, device=device, checkpoint=kept,
+        workers=min(1, cores - 1) if on_cpu else cores - 1,
+    )  # fmt: skip
     model.save(weights)
+    learner = "" if on_cpu else f"{torch.cuda.get_device_name(device)}, "
     checkpoint.unlink(missing_ok=True)
     return {
         "command": f"python -m tasks eyes --iterations {iterations} --seed {seed}",
         "seed": seed,
         "iterations": iterations,
         "seconds": round(kept.spent),
-        "machine": f"{platform.machine()}, one thread, torch {torch.__version__}",
+        "machine": f"{platform.machine()}, {cores} cores, {learner}torch {torch.__version__}",
         "log": log,
     }
 
