@@ -202,3 +202,25 @@ def test_a_torso_hangs_below_the_shoulder():
     x, y = middle(cloth)
     # Its stick begins 0.6 wide to the left and 0.8 tall below, and is one tall.
     assert x == pytest.approx(30 - 0.6 * 8, abs=1.5) and y > 50
+
+
+def test_a_hand_seen_from_above_is_half_as_long_and_as_wide_and_still_ends_at_its_tip():
+    tip, shoulder = np.array([70.0, 40]), np.array([8.0, 40])
+    sizes = []
+    for seen in (1.0, 0.5):
+        flat = person(hand=draw.HANDS["flat"], length=20.0, seen=seen, wrist=0.5, elbow=0.5)
+        layer = flat.draw(tip, shoulder, 0.0)
+        hand = layer[..., 1] > 60  # the glove is grey, the arm is red
+        rows, columns = (np.flatnonzero(hand.any(axis)) for axis in (1, 0))
+        assert columns[-1] == pytest.approx(70, abs=2)
+        sizes.append((np.ptp(columns), np.ptp(rows)))
+    (long, wide), (short, as_wide) = sizes
+    # Sticks have round ends, which get no shorter.
+    assert short < 0.65 * long and as_wide == pytest.approx(wide, abs=2)
+
+
+def test_one_tool_in_four_is_longer_than_a_hand():
+    tools = np.array([draw.Person(np.random.default_rng(i), 50).tool for i in range(400)])
+    held = tools[tools > 0]
+    assert 0.25 < len(held) / 400 < 0.35 and held.min() >= 3 and held.max() <= 32
+    assert 0.15 < (held > 16).mean() < 0.35
