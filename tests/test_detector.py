@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from lbw_minimal import video
-from lbw_minimal.clips import corners, detector, drawings, drawn_camera
+from lbw_minimal.clips import corners, detector, detector_networks, drawings, drawn_camera
 from lbw_minimal.clips.detector import Detector, Found, refine
 from lbw_minimal.clips.detector_networks import CELLS, Network, both_ways, loss, read, target
 from lbw_minimal.clips.drawings import STORIES, Clip, draw_clip
@@ -225,6 +225,7 @@ def test_a_tiny_training_on_easy_drawings_beats_chance(monkeypatch):
     monkeypatch.setattr(detector, "draw_clip", easy)
     monkeypatch.setattr(detector, "POOL", 24)
     monkeypatch.setattr(detector, "BATCH", 8)
+    monkeypatch.setattr(detector_networks, "WIDTH", 32)
     model, log = detector.train(iterations=100, seed=0)
     clips = [easy(np.random.default_rng([9, i])) for i in range(8)]
     # Chance: the mean place of all clips, which is the best guess without eyes.
