@@ -184,6 +184,19 @@ def test_a_reach_goes_from_the_arms_start_to_the_mark():
     assert abs(motion.arrival / FPS - 1.3) < 0.2 and motion.object is None
 
 
+@pytest.mark.parametrize(("share", "usable"), [(0.09, False), (0.12, True)])
+def test_a_hand_that_stirs_by_less_than_a_tenth_of_the_picture_does_not_reach(share, usable):
+    scene = replace(SCENE, start=(0.46, 0.12), goal=(0.68, 0.06), tip=(0.46, 0.12), contact=None)
+    t = np.arange(0, 2, 1 / 30)
+    x = np.array([100.0, 300.0]) + jerk(t / 1.5)[:, None] * [share * SIDE, 0.0]
+    tracks = seen((x, x), t, camera=np.eye(2, 3))
+    if usable:
+        lay(tracks, scene)
+    else:
+        with pytest.raises(Unusable, match="the hand never moves"):
+            lay(tracks, scene)
+
+
 @pytest.mark.parametrize(
     ("tip", "thing", "stands_in"), [(0.1, 0.6, 1), (0.2, 0.6, 0), (0.1, 0.4, 0)]
 )

@@ -115,8 +115,8 @@ class _Picture:
         noise, cell = _noise(*moves), max(self.size) / CELLS
         cells = tuple(max(1, round(n / cell)) for n in self.size)
         moves, stands = (
-            cv2.resize(_unlike(*one, noise), cells, interpolation=cv2.INTER_AREA)
-            for one in (moves, stands)
+            cv2.resize(_unlike(off, inside, noise), cells, interpolation=cv2.INTER_AREA)
+            for off, inside in (moves, stands)
         )
         better = stands - moves
         return np.sign(better) * (np.abs(better) > BETTER)

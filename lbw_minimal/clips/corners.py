@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import warnings
 from itertools import pairwise
+from typing import Any
 
 import cv2
 import numpy as np
@@ -27,7 +28,7 @@ CORNERS = 3  # fewer give no median
 def _found_again(one, two, corners):
     """Where the corners (n, 1, 2), n >= 1, of a grey frame are in another, and which (n,) bool come
     back when they are followed backwards."""
-    how = {"winSize": WINDOW, "flags": cv2.OPTFLOW_USE_INITIAL_FLOW}
+    how: dict[str, Any] = {"winSize": WINDOW, "flags": cv2.OPTFLOW_USE_INITIAL_FLOW}
     there, ok, _ = cv2.calcOpticalFlowPyrLK(one, two, corners, corners.copy(), **how)
     back, ok_back, _ = cv2.calcOpticalFlowPyrLK(two, one, there, there.copy(), **how)
     kept = (np.hstack([ok, ok_back]) > 0).all(1)

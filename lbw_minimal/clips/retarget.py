@@ -36,7 +36,9 @@ CONTACT = 0.12  # of the object's way: by then it is pushed, whatever the tip's 
 ARRIVED = 0.99  # of its way
 APPROACH = 0.6  # s, from the arm's start to where the clip's hand comes into reach
 RUN_UP = 2.0  # s before a hit that are kept
-LITTLE = 0.1  # of the picture's shorter side: what goes less far and is broken off was not done
+# Of the picture's shorter side: what goes less far and is broken off was not done, and a hand
+# that goes less far stirs beside its mark.
+LITTLE = 0.1
 LONGEST = 12.0  # s, the longest horizon of the tasks; only a hit cannot be hurried
 STEEP = 1.0  # height over width of the way; steeper, and it is not seen from the side
 UNSEEN = 0.4  # s, longer than a glitch of the detector
@@ -99,8 +101,8 @@ def lay(tracks: Tracks, scene: Scene, mirror: bool | None = None) -> Motion:
         gap = float(np.diff(seen).max())
         if gap > UNSEEN:
             warnings.append(f"The object is not seen for {gap:.1f} s; an even way was assumed.")
-    what = "object" if touched else "hand"
-    start, end = ends(thing, LEAST_WAY * tracks.side, what)
+    what, least = ("object", LEAST_WAY) if touched else ("hand", LITTLE)
+    start, end = ends(thing, least * tracks.side, what)
     if gets_faster(thing):
         gone = float(np.linalg.norm(end - start))
         if gone < LITTLE * tracks.side:
