@@ -40,11 +40,14 @@ def test_an_object_waits_for_a_share_of_the_tips_way_or_of_the_frames():
     tip = [0, 10, 20, 30, 30, 30, 40, 50, 50, 50]
     assert path(x).alone == pytest.approx(5 / 10)
     assert path(x, tip=tip).alone == pytest.approx(30 / 50)
+    assert path(x, tip=[7] * 10).alone == 0  # a tip that rests has gone no share of its way
 
 
 WAITS = [0, 0, 0, 0, 4, 8, 12, 16, 20, 20]
 THERE = [0, 5, 10, 15, 20]
 COMES = [-60, -40, -20, -10, -6, -2, 2, 6, 10, 10]
+FLIES = [-30, -20, -10, 0, 0, 80, 90, 95, 99, 99]  # away as soon as the object moves
+SNAPS = [-90, -80, -70, -60, -60, -2, 2, 6, 10, 10]  # comes when it has begun to
 
 
 @pytest.mark.parametrize(
@@ -55,6 +58,8 @@ COMES = [-60, -40, -20, -10, -6, -2, 2, 6, 10, 10]
         (np.multiply(WAITS, 0.45), COMES, True),  # 9 %
         (np.add(WAITS, 35), COMES, False),  # the hand is 45 % of the side away when it starts
         (np.add(WAITS, 25), COMES, True),
+        (WAITS, FLIES, True),
+        (WAITS, SNAPS, False),
         ([0, 0, 0, 0, 4, 8, 17.5, 18, 20, 20], COMES, False),  # 9.5 of 20 at once
         ([0, 0, 0, 0, 4, 8, 15.5, 18, 20, 20], COMES, True),  # 7.5 of 20
         ([0, 0, 0, 0, *THERE, *THERE[::-1], *THERE], None, True),  # 3 times its way
@@ -141,6 +146,22 @@ def test_peaks_are_the_highest_and_five_pixels_apart():
     assert places[:3].tolist() == [[30, 20], [5, 50], [35, 20]]
     np.testing.assert_allclose(heights[:3], [1.0, 0.8, 0.7])
     assert len(places) == 10 and alike[20, 30] == 1  # the map itself stays
+
+
+def test_a_patch_that_turns_back_is_followed_in_the_order_of_its_frames():
+    """The best place is the first peak in the first frame and another one in the last."""
+    rng = np.random.default_rng(0)
+    look = rng.integers(0, 255, (13, 13, 3), dtype=np.uint8)
+    x, small = [20, 20, 20, 22, 26, 30, 34, 38], []
+    for t, left in enumerate(x):
+        frame = np.full((80, 120, 3), 128, np.uint8)
+        if t > 4:  # a copy, farther than it leaps and as alike
+            frame[60:73, 100:113] = look
+        frame[30:43, left : left + 13] = np.where(t > 4, 0.9, 1) * look
+        small.append(frame.astype(np.uint8))
+    way = patches._path(small, small[0][30:43, 20:33], None)
+    np.testing.assert_allclose(way.places[:, 0], np.array(x) + 6.5, atol=0.51)
+    np.testing.assert_allclose(way.places[:, 1], 36.5, atol=0.51)
 
 
 def test_a_patch_goes_the_way_on_which_it_is_alike_without_leaping():

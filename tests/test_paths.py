@@ -133,6 +133,15 @@ def test_the_low_pass_is_a_gaussian_of_a_twentieth_of_a_second(hertz):
     np.testing.assert_allclose(left, wanted, atol=0.02)
 
 
+def test_a_frame_counts_for_as_long_as_it_is_shown():
+    """Of 240 a second one lasts 1 / 240 s, and has so much of a Gaussian of a twentieth."""
+    s = np.arange(0, 1, 1 / 240)
+    glitch = np.zeros((len(s), 2))
+    glitch[120] = 1
+    left = low_pass(s, glitch, np.array([0.5]))
+    np.testing.assert_allclose(left, 1 / 240 / (0.05 * np.sqrt(2 * np.pi)), rtol=0.02)
+
+
 def test_the_low_pass_stays_where_the_path_begins_and_ends():
     s = np.arange(0, 1, 0.04)
     path = np.stack([3 * s, 7 - s], 1)

@@ -153,6 +153,18 @@ def test_the_object_is_found_at_another_place_and_before_another_wall():
     np.testing.assert_allclose(seen.d, (1.5, -0.5), atol=0.15)
 
 
+def test_the_way_to_the_arm_is_told_from_behind_the_object_wherever_that_is(monkeypatch):
+    """The arm stands still while the object goes on by (1.5, -0.5): the way grows by as much."""
+    monkeypatch.setattr(tracks, "arm_near", lambda frame, wall, thing, place: np.array([9.0, 8]))
+    frames, d = ways(pace=(1.5, -0.5))
+    seen = tracker(frames)
+    seen.reset(frames[0])
+    np.testing.assert_allclose(seen.g, (9, 8) - seen.behind)
+    for frame in frames[1:]:
+        seen.step(frame)
+    np.testing.assert_allclose(seen.behind + seen.g + d[-1], (9, 8), atol=0.3)
+
+
 def test_a_lost_point_waits_where_the_others_are_and_is_found_again():
     frames, d = ways(steps=26, pace=(1.5, 0.0))
     seen = tracker(frames)

@@ -137,6 +137,12 @@ def test_pairs_are_near_each_other_or_drawn_freely_and_every_video_is_target_equ
     assert (gaps == 20).sum() > 20 > (gaps == 21).sum()
 
 
+def test_either_frame_of_two_is_source_as_often_as_the_other():
+    """Without the last one as a source a quarter of the sources would be frame 1."""
+    source, _ = tp._draw_pairs(np.array([2]), 4000, np.random.default_rng(0))
+    assert source.mean() == pytest.approx(0.5, abs=0.03)
+
+
 def test_some_keypoint_follows_each_moving_square(trained):
     _, _, z, _, centres = trained
     assert (follow(z, centres).max(0) > 0.9).all()

@@ -57,7 +57,8 @@ def test_a_turn_is_clockwise(turn, corner):
     seen = up(frame)
     assert seen.shape[:2] == ((4, 6) if turn % 180 == 0 else (6, 4))
     assert seen[corner].min() == 255 and (seen > 0).sum() == 3
-    assert len(up.notes) == (turn != 0)
+    said = f"It was turned by {turn} degrees clockwise, as was asked."
+    assert up.notes == ([said] if turn else [])
 
 
 @pytest.mark.parametrize(
