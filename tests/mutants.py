@@ -342,7 +342,7 @@ def main() -> None:
             warm.stdin.close()
             warm.wait()  # or its folder would be gone before it has begun
     noticed = sum(row["noticed"] for row in rows)
-    low, high = wilson(noticed, len(rows))
+    low, high = wilson(noticed, len(rows)) if rows else (0, 1)  # what none say
     print(f"{noticed} of {len(rows)} noticed, {100 * low:.1f} to {100 * high:.1f} % (Wilson, 95 %)")
 
 

@@ -127,3 +127,11 @@ def test_what_noise_does_everywhere_is_no_motion(monkeypatch):
     monkeypatch.setattr(motion, "_unexplained", lambda *_: (0 * rest + 5, 0 * rest + 5))
     late = np.arange(41) / 25 + 2 * (np.arange(41) > 30)  # a pause in which nothing changed
     assert jumps(frames, late) == []
+
+
+def test_a_jump_is_looked_for_without_what_a_sixth_of_the_picture_shares(monkeypatch):
+    windows = []
+    monkeypatch.setattr(motion.cv2, "blur", lambda grey, window: windows.append(window) or 0 * grey)
+    motion._unexplained(film([20, 22]), (112, 112))
+    (across, down), _ = windows
+    assert across == down and across % 2 and across / 112 == pytest.approx(1 / 6, abs=0.02)
