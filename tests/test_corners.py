@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from lbw_minimal.clips import corners
 from lbw_minimal.clips.corners import objects_own
 
 
@@ -16,3 +17,16 @@ def test_a_corner_that_goes_less_than_a_quarter_of_the_objects_way_is_not_its(sh
     assert is_own.tolist() == [own]
     if share == 1:
         np.testing.assert_allclose(middle, [[-3, -1]])
+
+
+@pytest.mark.parametrize(("fewer", "known"), [(0, True), (1, False)])
+def test_three_corners_tell_an_objects_way_and_two_do_not(fewer, known, monkeypatch):
+    """The object is found by up to 2 pixels beside where its corners say that it is."""
+    way = np.stack([np.linspace(20, 60, 20), np.full(20, 40.0)], 1)
+    offsets = np.array([(-3.0, 0), (3, 0), (0, 4)])[: 3 - fewer]
+    monkeypatch.setattr(corners, "follow", lambda grey: way[-len(grey) :, None] + offsets)
+    found = way + np.random.default_rng(0).uniform(-2, 2, way.shape)
+    path, there = corners.followed(np.zeros((20, 84, 84, 3), np.uint8), found)
+    assert there.all() == there.any() == known
+    off = np.abs(path - way - (path - way).mean(0)).max()
+    assert off < 1e-9 if known else off > 0.5

@@ -153,7 +153,7 @@ def test_a_job_notes_what_makes_the_run_again(tmp_path, monkeypatch):
     assert len(settings["video"]) == 16 and made.recipe.updates == 3
     assert made.command.startswith("python -m tasks push --method tracks --seed 3")
     assert made.command.endswith("--threads 1") and f"'{tmp_path / 'a b'}'" in made.command
-    assert len(made.random) == 0 and made.trained is None and len(made.demo) == 1
+    assert made.random.shape == (0, 84, 84, 3) and made.trained is None and len(made.demo) == 1
 
 
 def test_a_smoke_run_is_of_smoke_sizes_and_what_is_set_comes_before_them(tmp_path, monkeypatch):

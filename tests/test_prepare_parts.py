@@ -117,3 +117,28 @@ def test_84_pixels_are_enough_and_83_are_not(monkeypatch):
     with pytest.raises(Unusable, match="160x83 pixels are too few"):
         follow(prepared(clip=clip(height=83)), Choices())
     assert len(checked) == 1
+
+
+def test_the_scene_is_closed_whatever_becomes_of_the_clip(monkeypatch):
+    closed, motion = [], SimpleNamespace(notes=["laid"], warnings=[])
+    done = SimpleNamespace(notes=["done"], warnings=[], frames=None)
+    env = SimpleNamespace(
+        reset=lambda seed: (None, {}), scene=lambda: None, close=lambda: closed.append(True)
+    )
+    monkeypatch.setattr(prepare.tasks, "bare", lambda *what, **more: env)
+    monkeypatch.setattr(prepare, "read_clip", lambda path, **more: clip())
+    monkeypatch.setattr(prepare, "is_own", lambda *what: False)
+    monkeypatch.setattr(prepare, "reenact", lambda *what: done)
+    monkeypatch.setattr(prepare, "keep", lambda *what: None)
+    monkeypatch.setattr(prepare, "follow", lambda *what: motion)
+    assert prepare.prepare("push", "a.mp4").notes == ["laid", "done"] and len(closed) == 1
+
+    def unusable(*what):
+        raise Unusable("no arm is seen", "film one")
+
+    monkeypatch.setattr(prepare, "follow", unusable)
+    assert "no arm is seen" in prepare.prepare("push", "a.mp4").why_not and len(closed) == 2
+    monkeypatch.setattr(prepare, "follow", lambda *what: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        prepare.prepare("push", "a.mp4")
+    assert len(closed) == 3
