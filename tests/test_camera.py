@@ -61,3 +61,9 @@ def test_light_that_flickers_moves_nothing():
     light = 1 + 0.1 * np.sin(np.arange(T))[:, None, None, None]
     frames = np.clip(through(shifted(np.zeros(T))) * light, 0, 255).astype(np.uint8)
     assert camera.extent(camera.sway(frames), H, W) == 0
+
+
+def test_in_a_room_without_anything_nothing_moves():
+    sways = camera.sway(np.full((6, H, W, 3), 128, np.uint8))
+    np.testing.assert_allclose(sways, np.eye(3)[None, :2].repeat(6, 0))
+    assert camera.extent(sways, H, W) == 0
