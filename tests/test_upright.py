@@ -83,6 +83,28 @@ def test_an_hd_film_that_names_no_matrix_has_bt_709s(rows, matrix, asked):
     assert (given["width"], given["interpolation"]) == (320, "AREA")
 
 
+@pytest.mark.parametrize(
+    ("width", "height", "pixel", "how"),
+    [
+        (1280, 720, 1.0, "AREA"),
+        (310, 200, 1.5, "BICUBIC"),  # 465 by 200 pixels become 320 by 138: wider, and less high
+        (200, 310, 1 / 1.5, "BICUBIC"),
+        (600, 400, 1.5, "AREA"),
+    ],
+)
+def test_areas_are_averaged_only_where_both_sides_get_shorter(width, height, pixel, how):
+    given = {}
+
+    def reformat(frame, **asked):
+        given.update(asked)
+        return SimpleNamespace(to_ndarray=lambda: np.zeros((9, 16, 3), np.uint8))
+
+    up = Upright(stream(width, height, pixel))
+    up._scaler = SimpleNamespace(reformat=reformat)
+    up(SimpleNamespace(width=width, height=height, colorspace=1, color_trc=1, side_data={}))
+    assert given["interpolation"] == how
+
+
 def boxed(top=0, bottom=0, left=0, right=0, level=0, inside=120):
     frames = np.full((9, 100, 200, 3), level, np.uint8)
     frames[:, top : 100 - bottom, left : 200 - right] = inside
