@@ -1,5 +1,7 @@
 """Numbers that the kit has from elsewhere: the paper's, and those that its own pages state."""
 
+import dataclasses
+import json
 import re
 
 import numpy as np
@@ -17,6 +19,7 @@ TABLE_I = {
     "drawer": (986, 2940),
     "coffee": (658, 4007),
 }
+RESULTS = tasks.ROOT / "solutions" / "results"
 README = (tasks.ROOT / "README.md").read_text(encoding="utf-8")
 
 
@@ -30,6 +33,20 @@ def test_perception_learns_from_as_many_frames_as_in_table_1(task):
 def test_a_policy_takes_the_steps_that_readme_says(task):
     steps = re.search(rf"^\| {task} \|.*\| ([\d,]+) \|$", README, re.M).group(1)
     assert tasks.module(task).RECIPE.policy_steps == int(steps.replace(",", ""))
+
+
+@pytest.mark.parametrize("task", tasks.TASKS)
+def test_the_kits_results_are_of_the_kits_recipes(task):
+    """Each run in which nothing was set, of each method: all that it says of its recipe."""
+    recipe, methods = dataclasses.asdict(tasks.module(task).RECIPE), set()
+    runs = [*RESULTS.glob(f"policies/{task}-*"), *RESULTS.glob(f"paper/runs/{task}-*")]
+    for run in runs:
+        settings = json.loads((run / "metrics.json").read_text(encoding="utf-8"))["settings"]
+        if not settings["set"]:
+            told = settings["recipe"]
+            assert told == {field: recipe[field] for field in told}, run.name
+            methods.add(settings["method"] if "method" in settings else "lbw")
+    assert methods >= {"lbw", "avid", "classifier"}
 
 
 @pytest.mark.parametrize("task", tasks.TASKS)
