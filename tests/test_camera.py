@@ -67,3 +67,14 @@ def test_in_a_room_without_anything_nothing_moves():
     sways = camera.sway(np.full((6, H, W, 3), 128, np.uint8))
     np.testing.assert_allclose(sways, np.eye(3)[None, :2].repeat(6, 0))
     assert camera.extent(sways, H, W) == 0
+
+
+@pytest.mark.parametrize("fixed", [(0, 0), (W, 0), (0, H), (W, H)])
+def test_the_extent_is_the_way_of_the_corner_opposite_to_one_that_stays(fixed):
+    """A turn by 0.1 about a corner of the picture."""
+    c, s = np.cos(0.1), np.sin(0.1)
+    turn, fixed = np.array([[c, -s], [s, c]]), np.array(fixed, float)
+    view = np.column_stack([turn, fixed - turn @ fixed])
+    way = (turn - np.eye(2)) @ ((W, H) - 2 * fixed)
+    sways = np.stack([np.eye(3)[:2], view])
+    assert camera.extent(sways, H, W) == pytest.approx(np.abs(way).max() / W)

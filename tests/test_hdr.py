@@ -18,6 +18,7 @@ from lbw_minimal.clips.reader import read_clip
         (lambda e: 100 * hdr.pq_light(e), 0.58, 203),
         (lambda e: 100 * hdr.pq_light(e), 0.38, 26),
         (lambda e: 100 * hdr.pq_light(e), 1.0, 10000),
+        (lambda e: 100 * hdr.pq_light(e), 0.0, 0),
     ],
 )
 def test_curves_meet_the_standards_levels(curve, signal, light):
