@@ -69,10 +69,12 @@ def test_in_a_room_without_anything_nothing_moves():
     assert camera.extent(sways, H, W) == 0
 
 
-@pytest.mark.parametrize("fixed", [(0, 0), (W, 0), (0, H), (W, H)])
-def test_the_extent_is_the_way_of_the_corner_opposite_to_one_that_stays(fixed):
-    """A turn by 0.1 about a corner of the picture."""
-    c, s = np.cos(0.1), np.sin(0.1)
+@pytest.mark.parametrize(
+    ("fixed", "angle"), [((0, 0), -0.1), ((W, 0), 0.1), ((0, H), 0.1), ((W, H), -0.1)]
+)
+def test_the_extent_is_the_way_of_the_corner_opposite_to_one_that_stays(fixed, angle):
+    """A turn about a corner of the picture; the other two go less far."""
+    c, s = np.cos(angle), np.sin(angle)
     turn, fixed = np.array([[c, -s], [s, c]]), np.array(fixed, float)
     view = np.column_stack([turn, fixed - turn @ fixed])
     way = (turn - np.eye(2)) @ ((W, H) - 2 * fixed)
