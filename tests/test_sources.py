@@ -45,7 +45,7 @@ def test_the_kits_results_are_of_the_kits_recipes(task):
         if not settings["set"]:
             told = settings["recipe"]
             assert told == {field: recipe[field] for field in told}, run.name
-            methods.add(settings["method"] if "method" in settings else "lbw")
+            methods.add(settings.get("method", "lbw"))
     assert methods >= {"lbw", "avid", "classifier"}
 
 

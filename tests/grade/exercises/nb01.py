@@ -459,9 +459,6 @@ Point.mistake(
     "float(done), self.t >= 50, {",
 )
 Point.mistake("Success is |x| < 0.05; your bound is another.", "< 0.05", "< 0.1")
-Point.mistake(
-    "A point that is just 0.05 away from 0 is not there yet: < and not <=.", "< 0.05", "<= 0.05"
-)
 for theirs in (
     "np.random.uniform(-1, 1), 0",
     "np.random.seed(seed) or np.random.uniform(-1, 1), 0",
