@@ -55,6 +55,19 @@ def wander(rng):
 def hold(maps):
     return transporter.soft_argmax(torch.from_numpy(maps)[None])[0].numpy()
 """,
+    8: """
+import cv2
+
+
+def put_out(film):
+    film, median = film.astype(float), np.median(film, axis=0)
+    for frame in film:
+        off = np.uint8(np.abs(frame - median).mean(-1) > 8)
+        _, part, sizes, _ = cv2.connectedComponentsWithStats(off)
+        small = (sizes[:, -1] < 60)[part]
+        frame[small] = median[small]
+    return film
+""",
     9: """
 def steer(z, actions, z_E):
     J = np.linalg.lstsq(actions, np.diff(z, axis=0).reshape(len(actions), -1), rcond=None)[0].T
