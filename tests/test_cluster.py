@@ -103,6 +103,17 @@ def test_without_ray_a_sentence_says_how_to_get_it(tmp_path, monkeypatch, capsys
     assert "pip install -r requirements-cluster.txt" in capsys.readouterr().err
 
 
+def test_where_ray_does_not_start_its_words_are_said(monkeypatch):
+    ray = pytest.importorskip("ray", reason="needs Ray: make cluster")
+
+    def init(address, **_):
+        raise ConnectionError if address == "auto" else Exception("timed out during startup")
+
+    monkeypatch.setattr(ray, "init", init)
+    with pytest.raises(InputError, match="--ray: Ray does not start here: timed out during start"):
+        cluster.connect()
+
+
 @pytest.mark.parametrize("command", ["table", "ablation"])
 def test_jobs_and_ray_do_not_go_together(command, capsys):
     assert main([command, "--ray", "--jobs", "2"]) == 2

@@ -39,7 +39,8 @@ class Refused(Exception):
 def connect(kit: tuple[str, ...] = KIT) -> Any:
     """Ray, connected to the cluster that runs here or at RAY_ADDRESS, else to a local one.
 
-    kit: what of the kit goes to a cluster that runs. Raises InputError without Ray.
+    kit: what of the kit goes to a cluster that runs. Raises InputError without Ray, and where it
+    does not start, as on a machine with far too much to do.
     """
     sys.path.insert(0, str(LEAN))
     try:
@@ -60,7 +61,10 @@ def connect(kit: tuple[str, ...] = KIT) -> Any:
             ray.init(address="auto", runtime_env=there, logging_level="warning")
         except ConnectionError:
             with on_path(LEAN, ROOT):  # a local one finds the kit where it is
-                ray.init(address="local", include_dashboard=False, logging_level="warning")
+                try:
+                    ray.init(address="local", include_dashboard=False, logging_level="warning")
+                except Exception as e:  # Ray raises no narrower one
+                    raise InputError(f"--ray: Ray does not start here: {e}") from e
     return ray
 
 
