@@ -46,7 +46,7 @@ class Tracks:
     side: int  # pixels, the shorter side of the frames
     cuts: tuple[int, ...] = ()  # frames at which the picture changes all at once
     enters: float = np.nan  # where the arm comes in, 0 at the left edge, 1 at the right
-    unmoved: bool = False  # whether the last frames look as the first ones
+    unmoved: bool = False  # whether the last frames look as the first ones, but for the arm
 
     def part(self, first: int, last: int) -> Tracks:
         """Frames `first` to `last` - 1."""
@@ -155,7 +155,7 @@ def trusted(tracks: Tracks, name: str) -> tuple[np.ndarray, np.ndarray]:
             raise Unusable("the object never moves, what may be it stands at one place", NEARER)
         if tracks.unmoved:
             raise Unusable(
-                "the object never moves, in the end all looks as it did at first", NEARER
+                "the object never moves, as far as is seen: in the end only the arm differs", NEARER
             )
         raise Unusable(
             f"the object is seen in {sure.mean():.0%} of the frames, and hidden or too small else",
