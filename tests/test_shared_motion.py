@@ -16,8 +16,8 @@ def votes(moved=0, still=0):
     return said.T[None]
 
 
-@pytest.mark.parametrize(("moved", "still", "stands"), [(30, 29, False), (30, 30, True)])
-def test_the_camera_moves_if_more_cells_say_so_than_not(moved, still, stands):
+@pytest.mark.parametrize(("moved", "still", "stands"), [(37, 30, False), (36, 30, True)])
+def test_the_camera_moves_if_six_cells_say_so_for_five_that_do_not(moved, still, stands):
     assert camera._stands(votes(moved, still)) == stands
 
 
