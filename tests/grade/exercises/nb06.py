@@ -380,8 +380,9 @@ trim.check(
 )
 trim.check("trembling on the spot is rest, however long the way", _trembling)
 trim.check(
-    "a frame exactly `least` away stays",
+    "a frame exactly `least` away stays, one that is a hair nearer does not",
     lambda rng: (0.5 * np.arange(rng.integers(6, 12))[:, None, None] * np.array([[1.0, 0.0]]), 0.5),
+    least=lambda rng: (np.array([0, 0.5 - 2**-12, 1.5, 2])[:, None, None] * [[1.0, 0.0]], 0.5),
 )
 trim.check(
     "first and last frame stay",
@@ -456,6 +457,11 @@ trim.mistake(
     "    return z[kept + [len(z) - 1]]",
     "    if len(kept) > 1 and np.linalg.norm(z[-1] - z[kept[-1]]) < least:\n        kept.pop()\n"
     "    return z[kept + [len(z) - 1]]",
+)
+trim.mistake(
+    "At least `least` away, exactly: yours lets pass what is a little nearer.",
+    ">= least",
+    ">= least - 1e-3",
 )
 trim.mistake("You keep what rests and cut what moves.", ">= least", "< least")
 trim.mistake(
