@@ -69,9 +69,17 @@ def test_a_demonstration_that_is_too_long_is_hurried_and_a_short_one_keeps_its_t
     assert TrackReward(slow, horizon=50).episode == 50
 
 
-@pytest.mark.parametrize("path", [np.zeros((9, 2)), np.zeros((2, 2)), np.zeros((9, 3))])
-def test_a_path_that_shows_nothing_is_refused(path):
-    with pytest.raises(InputError):
+@pytest.mark.parametrize(
+    ("path", "why"),
+    [
+        (np.zeros((9, 2)), "moves by 0.0 pixels"),
+        (PATH[::3], r"of shape \(2, 2\)"),
+        (np.outer(np.arange(9), (1, 1, 1)), r"of shape \(9, 3\)"),
+        (np.arange(9), r"of shape \(9,\)"),
+    ],
+)
+def test_a_path_that_shows_nothing_or_is_none_is_refused(path, why):
+    with pytest.raises(InputError, match=why):
         TrackReward(path)
 
 

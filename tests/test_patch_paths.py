@@ -179,3 +179,13 @@ def test_a_patch_goes_the_way_on_which_it_is_alike_without_leaping():
     way = patches._path(small, small[0][30:43, 20:33], None)
     np.testing.assert_allclose(way.places[:, 0], 26.5 + 6 * np.arange(9), atol=0.51)
     assert way.alike[0] > 0.99 and way.alike[4] < 0.95 and way.side == 80
+
+
+def test_patches_at_the_pictures_edge_are_as_large_as_elsewhere(monkeypatch):
+    """Of corners of the picture and beyond them: 13 and 19 pixels, whole."""
+    cut = []
+    monkeypatch.setattr(patches, "_path", lambda small, patch, tip: cut.append(patch.shape[:2]))
+    frame = np.random.default_rng(0).integers(0, 255, (90, 120, 3), dtype=np.uint8)
+    places = [(0, np.array(at, float)) for at in ((0, 0), (119, 89), (200, -5), (60, 45))]
+    patches.paths(np.stack([frame, frame]), places, None, 1.0)
+    assert cut == 4 * [(13, 13), (19, 19)]
