@@ -1,4 +1,4 @@
-"""A command that is asked for none of what it counts says so, before anything begins."""
+"""A command that is asked for none of what it counts, or for what does nothing, says so at once."""
 
 import pytest
 
@@ -21,3 +21,16 @@ def test_none_is_refused(command, option, capsys):
 def test_no_seed_is_below_0(command, capsys):
     assert main([*command.split(), "--seed", "-1"]) == 2
     assert "--seed: '-1'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("line", "quoted"),
+    [
+        ("push --method tracks --from-scratch", "--from-scratch does"),
+        ("push --from-scratch --weights elsewhere", "--weights elsewhere does"),
+        ("push --evaluate --set updates=3 --set entropy=-2", "--set updates=3, entropy=-2 does"),
+    ],
+)
+def test_what_does_nothing_is_quoted_as_it_was_typed(line, quoted, capsys):
+    assert main(line.split()) == 2
+    assert f"error: {quoted} nothing here: " in capsys.readouterr().err
