@@ -83,7 +83,7 @@ def test_a_change_of_the_picture_is_a_cut_where_the_hand_is_not_seen():
 
 
 def test_enough_frames_have_to_be_sure_and_only_those_count():
-    """Half of them of the object, which a hand hides for a while; of the tip 15 %."""
+    """Half of them of the object, which a hand hides for a while; of the tip 30 %."""
     sure = np.tile([0.6, 0.3], 10)
     x = np.where(sure > 0.5, 2.0 * np.arange(20), 500)
     times, points = trusted(tracks(x, sure=sure), "tip")
@@ -92,10 +92,10 @@ def test_enough_frames_have_to_be_sure_and_only_those_count():
     sure[0] = 0.3
     with pytest.raises(Unusable, match="seen in 45% of the frames"):
         trusted(tracks(x, sure=sure), "object")
-    sure[:14] = 0.3
-    assert len(trusted(tracks(x, sure=sure), "tip")[0]) == 3
-    sure[14] = 0.3
-    with pytest.raises(Unusable, match="tip of the hand is seen in 10%"):
+    sure[:8] = 0.3
+    assert len(trusted(tracks(x, sure=sure), "tip")[0]) == 6
+    sure[8] = 0.3
+    with pytest.raises(Unusable, match="tip of the hand is seen in 25%"):
         trusted(tracks(x, sure=sure), "tip")
 
 

@@ -198,10 +198,10 @@ def test_a_hand_that_stirs_by_less_than_a_tenth_of_the_picture_does_not_reach(sh
 
 
 @pytest.mark.parametrize(
-    ("tip", "thing", "stands_in"), [(0.1, 0.6, 1), (0.2, 0.6, 0), (0.1, 0.4, 0)]
+    ("tip", "thing", "stands_in"), [(0.25, 0.6, 1), (0.35, 0.6, 0), (0.25, 0.4, 0)]
 )
 def test_in_a_reach_what_moves_is_the_hand_if_no_tip_is_found(tip, thing, stands_in):
-    """A tip in a seventh of the frames is enough, and what moves has to be seen in half of them."""
+    """A tip in three frames of ten is enough; what moves has to be seen in half of them."""
     n = 100
     sure = [np.where(np.arange(n) < n * share, 1.0, 0.0) for share in (tip, thing)]
     tracks = Tracks(np.arange(n) / 25, np.zeros((n, 2)), np.ones((n, 2)), *sure, side=200)
