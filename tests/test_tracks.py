@@ -111,6 +111,15 @@ def test_an_object_of_the_backgrounds_colour_is_as_large_as_flow_looks_about_its
     assert elsewhere.sum() == 25 and elsewhere[60, 30]
 
 
+@pytest.mark.parametrize("d", [(20, 0), (0, 15), (20, -12), (-9, 9)])
+def test_the_objects_pixels_are_found_whichever_way_it_goes(d):
+    first = np.full((84, 84, 3), 100, np.uint8)
+    last = first.copy()
+    first[40:47, 30:39] = last[40 + d[1] : 47 + d[1], 30 + d[0] : 39 + d[0]] = 200
+    found = tracks.silhouette(first, last, np.array(d, float), np.array([[34.0, 43]]))
+    assert (found == (first[..., 0] == 200)).all()
+
+
 def test_a_background_is_seen_through_what_stands_before_it_for_most_of_a_film():
     """For 65 of 100 frames an arm covers the wall, with many colours; the median shows the arm."""
     rng = np.random.default_rng(0)
