@@ -29,9 +29,9 @@ def pytest_collection_modifyitems(items):
 # The archive for students has no solved notebooks, and these tests are of them.
 if not any((Path(__file__).parent.parent / "solutions").glob("*.ipynb")):
     collect_ignore = [
-        "test_answers.py", "test_archive.py", "test_cluster.py", "test_for_class.py",
-        "test_grading.py", "test_grading_files.py", "test_lessons.py", "test_nbgrader.py",
-        "test_notebooks.py", "test_pages.py", "test_systems.py",
+        "test_answers.py", "test_archive.py", "test_arguments.py", "test_cluster.py",
+        "test_for_class.py", "test_grading.py", "test_grading_files.py", "test_lessons.py",
+        "test_nbgrader.py", "test_notebooks.py", "test_pages.py", "test_systems.py",
     ]  # fmt: skip
 
 
