@@ -95,7 +95,7 @@ BAD = {
     "wrong type": ("def r1(z, z_E):\n    return 'a large reward'", 0),
     "wrong dtype": ("def r1(z, z_E):\n    return np.zeros((), complex) + 1j", 0),
     "other device": ("def r1(z, z_E):\n    return torch.zeros((), device='meta')", 0),
-    "changes its inputs": (RIGHT.replace("    return", "    z_E[:] = 0\n    return"), 0),
+    "changes an input": (RIGHT.replace("    return", "    z_E[:] = 0\n    return"), 0),
     "counts its calls": (
         "calls = 0\n" + COUNTING.replace("return", "return calls * "), 0,
     ),

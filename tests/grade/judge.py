@@ -30,7 +30,7 @@ CHANGES = {  # by the kinds of `cell.answer.state`
     "graph": "it cuts an input off from its gradient for good, as detach_ and requires_grad_ do: "
     "leave it as it is; detach() makes a new tensor",
     "mode": "it changes the mode of a network it was given, by train or eval: leave it as it is",
-    "values": "it changes its inputs: work on a copy",
+    "values": "it changes an input that has to stay as it is",
     "grad": "it clears or adds to gradients of what it was given, as zero_grad and backward do: "
     "leave them as they are",
 }

@@ -413,8 +413,8 @@ def _wish(rng, far):
 to_action.check("a place within one step", lambda rng: _wish(rng, 0.5))
 to_action.check("a place far away: full action, no more", lambda rng: _wish(rng, 5.0))
 to_action.mistake(
-    "An action is at most 1 and at least -1, and yours is not clipped: a place far away takes full "
-    "steps.",
+    "An action is at most 1 and at least -1, and what you return is not: clip last, after the "
+    "division by step.",
     "np.clip((wanted - goal) / step, -1, 1)",
     "(wanted - goal) / step",
 )

@@ -366,7 +366,7 @@ disturbance.mistake(
     "np.linalg.norm((z_a - z_b).mean(0), axis=-1)",
 )
 disturbance.mistake(
-    "x and y belong together: the distance is the norm over both.",
+    "x and y belong together: the distance is the root of the sum of their squares, not their sum.",
     "np.linalg.norm(z_a - z_b, axis=-1)",
     "np.abs(z_a - z_b).sum(-1)",
 )

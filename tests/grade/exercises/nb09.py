@@ -89,7 +89,7 @@ make_drawer.mistake(
     "",
 )
 make_drawer.mistake(
-    "The drawer slides along x, axis (1, 0, 0); the mug's hinge, (0, 0, 1), stands upright.",
+    "The drawer slides along x, axis (1, 0, 0); (0, 0, 1) is the way up.",
     "linkJointAxis=[(1, 0, 0)]",
     "linkJointAxis=[(0, 0, 1)]",
 )

@@ -251,7 +251,7 @@ difference.mistake(
     "a[picks_a].sum(1) - b[picks_b].sum(1)",
 )
 difference.mistake(
-    "np.quantile counts from 0 to 1, np.percentile from 0 to 100: 0.025 is 2.5 %.",
+    "np.quantile counts from 0 to 1, np.percentile from 0 to 100: its 2.5 is the other's 0.025.",
     "np.quantile",
     "np.percentile",
 )
