@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tasks.needs  # noqa: F401  # isort: skip  # first: it says what the others lack
 from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path

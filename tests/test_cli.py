@@ -118,7 +118,7 @@ def an_option_that_is_none(folder):
 
 
 def one_argument_too_many(folder):
-    return ["push", "reach"], "reach"
+    return ["push", "reach"], "'reach' is one argument too many (a name with a space wants quotes)"
 
 
 def no_seed(folder):

@@ -60,7 +60,7 @@ class Parser(argparse.ArgumentParser):
             return args
         option = unknown[0].partition("=")[0]
         if not option.startswith("-"):
-            self.error(f"{option!r} is one argument too many")
+            self.error(f"{option!r} is one argument too many (a name with a space wants quotes)")
         owners = [
             f"python -m tasks {parser.command}"
             for parser in parsers()
