@@ -29,6 +29,7 @@ from lbw_minimal.pictures import (
     svg,
 )
 from lbw_minimal.report_texts import (
+    CLIP,
     CSS,
     DEMONSTRATION,
     EPISODE,
@@ -54,6 +55,7 @@ LEARNS = {  # the stages in which something is learnt; the others film
     "classifier": ("classifier", "policy"),
     "tracks": ("policy",),
 }
+COLUMNS = 8  # of the strips that show a video
 EPISODE_TITLE = "What the robot does now"
 MACHINE = (
     "version",
@@ -82,6 +84,7 @@ def write_report(
     demo: np.ndarray,
     translated: np.ndarray | None = None,
     z_demo: np.ndarray | None = None,
+    clip: np.ndarray | None = None,
     logits: np.ndarray | None = None,
     log: list[dict] | None = None,
     episode: dict | None = None,
@@ -94,10 +97,11 @@ def write_report(
     """Write the page of a run, whole or not at all; what is None or empty is left out.
 
     demo, translated: (N, 84, 84, 3) uint8; z_demo (N, K, 2): the keypoints found on `translated`;
-    logits (N,): a rival's goal classifier on it, or on `demo` where nothing is translated. log:
-    the policy's, a row per episode. episode: a test episode's "frames" (T, 84, 84, 3) uint8,
-    "z" (T, K, 2) (or observations whose first 2K numbers are z), and "parts", a dict of reward
-    parts per step. metrics: as in metrics.json: "success", "episodes", "stages" in s, "perception",
+    clip (n, S, S, 3) uint8: stills of a person's clip, which `demo` does again; logits (N,): a
+    rival's goal classifier on `translated`, or on `demo` where nothing is translated. log: the
+    policy's, a row per episode. episode: a test episode's "frames" (T, 84, 84, 3) uint8, "z"
+    (T, K, 2) (or observations whose first 2K numbers are z), and "parts", a dict of reward parts
+    per step. metrics: as in metrics.json: "success", "episodes", "stages" in s, "perception",
     "settings", "machine". scene_html: a page of its own. command: what makes this run again.
     links: HTML that leads to other pages.
     """
@@ -108,6 +112,8 @@ def write_report(
     kind = method if method in ("lbw", "tracks") else "rival"
     form = "object tracks'" if kind == "tracks" else form
     page = [headline(task, metrics, method)]
+    if clip is not None:
+        page += section("Your clip", CLIP[method], strip(clip))
     if translated is not None and z_demo is not None and "frames" in episode:
         page.append(_method(demo, translated, z_demo, episode))
     columns = demonstration(demo, translated, z_demo, fps, logits)
@@ -207,7 +213,7 @@ def demonstration(
     logits: np.ndarray | None = None,
 ) -> str:
     """As the paper's Fig. 5: frames of the video above their translations, in columns that wrap."""
-    i, columns = spread(len(demo), 8), []
+    i, columns = spread(len(demo), COLUMNS), []
     rows, what = [enlarge(demo[i], 3)], "the video"
     if translated is not None:
         what = "the video and its translation"
@@ -221,6 +227,12 @@ def demonstration(
         shown = picture(png(both), f"Frame {t + 1} of {what}")
         columns.append(f"<figure>{shown}<figcaption>{caption}</figcaption></figure>")
     return f'<div class="strip">{"".join(columns)}</div>'
+
+
+def strip(clip: np.ndarray) -> str:
+    """Stills (n, S, S, 3) uint8 of a person's clip, from left to right."""
+    shown = (picture(png(still), f"Still {k} of the clip") for k, still in enumerate(clip, 1))
+    return f'<div class="strip">{"".join(f"<figure>{image}</figure>" for image in shown)}</div>'
 
 
 def figures(metrics: dict[str, Any]) -> list[str]:

@@ -129,6 +129,19 @@ SHOWN = {
     "tracks": "What the human showed, and the object in it",
 }
 
+CLIP = {
+    "lbw": """
+<p>This is your clip. A simulated human did its motion again in the task's scene; that film was
+translated, and the robot imitates it. So it learns your motion, not your object. <a
+href="prepare.html">What was found in the clip</a></p>
+""",
+    "tracks": """
+<p>This is your clip. A simulated human did its motion again in the task's scene, and the robot
+imitates how the object moved in that film. So it learns your motion, not your object. <a
+href="prepare.html">What was found in the clip</a></p>
+""",
+}
+
 DEMONSTRATION = {
     "lbw": """
 <p>Above: the human video, from left to right. Below: the same moments as the translation network

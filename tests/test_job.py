@@ -17,12 +17,22 @@ from tasks.commands.job import METHODS, fields_of, prepare_folder, read_number, 
 def test_a_new_run_clears_an_older_runs_results_and_nothing_else(tmp_path):
     prepare_folder(tmp_path, {"seed": 0}, resume=False)
     old = ("policy.checkpoint", "policy.frames", "policy.safetensors", "policy_log.json",
-           "metrics.json", "report.html", "prepare.html", "reenactment.mp4")  # fmt: skip
+           "metrics.json", "report.html", "prepare.html", "reenactment.mp4",
+           "stills.webp")  # fmt: skip
     for name in (*old, "thesis.txt", "notes.json"):
         (tmp_path / name).write_text("")
     assert prepare_folder(tmp_path, {"seed": 1}, resume=False) == tmp_path
     assert {p.name for p in tmp_path.iterdir()} == {"thesis.txt", "notes.json", "settings.json"}
     assert json.loads((tmp_path / "settings.json").read_text()) == {"seed": 1}
+
+
+def test_who_replaces_an_earlier_run_of_other_settings_is_told(tmp_path, capsys):
+    prepare_folder(tmp_path, {"seed": 0}, resume=False)
+    prepare_folder(tmp_path, {"seed": 0}, resume=False)
+    assert capsys.readouterr().err == ""
+    prepare_folder(tmp_path, {"seed": 1}, resume=False)
+    said = f"note: {tmp_path}: an earlier run with other settings is replaced.\n"
+    assert capsys.readouterr().err == said
 
 
 def test_what_looks_like_results_in_a_folder_without_a_run_is_somebody_elses(tmp_path):

@@ -227,6 +227,17 @@ def test_a_page_leads_to_those_beside_it_and_names_the_command_of_the_others(tmp
     assert "href" not in elsewhere and str(tmp_path) not in elsewhere
 
 
+def test_the_report_of_a_run_and_the_page_of_its_clip_lead_to_each_other(tmp_path):
+    run, runs = tmp_path / "push-my", tmp_path / "runs"
+    run.mkdir()
+    for page in ("report.html", "prepare.html"):
+        assert "href" not in links.links(run / page, runs)  # nothing is there yet
+    (run / "settings.json").touch()
+    assert re.findall('href="([^"]+)"', links.links(run / "prepare.html", runs)) == ["report.html"]
+    (run / "prepare.html").touch()
+    assert re.findall('href="([^"]+)"', links.links(run / "report.html", runs)) == ["prepare.html"]
+
+
 def test_a_figure_is_described_by_its_own_words():
     from matplotlib.figure import Figure
 

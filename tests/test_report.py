@@ -313,3 +313,18 @@ def test_a_failure_on_the_way_leaves_the_old_page(tmp_path, run, monkeypatch):
     with pytest.raises(ZeroDivisionError):
         written(tmp_path, run)
     assert (tmp_path / "report.html").read_text() == "old"
+
+
+@pytest.mark.parametrize("method", ["lbw", "tracks"])
+def test_a_persons_clip_comes_before_all_else_that_was_seen(tmp_path, run, method):
+    stills = np.stack([np.full((252, 252, 3), 40 * k, np.uint8) for k in range(5)])
+    run["metrics"] = {"settings": {"method": method}}
+    page = written(tmp_path, run | {"clip": stills})
+    assert titles(page)[:2] == ["Your clip", report.SHOWN[method]]
+    part = page.partition("Your clip")[2].partition("<h2>")[0]
+    images = re.findall(r'base64,([^"]+)" alt="Still (\d) of the clip"', part)
+    shown = [np.asarray(Image.open(io.BytesIO(base64.b64decode(data)))) for data, _ in images]
+    np.testing.assert_array_equal(shown, stills)
+    assert [k for _, k in images] == list("12345")
+    assert 'href="prepare.html"' in part
+    assert "Your clip" not in written(tmp_path, run)

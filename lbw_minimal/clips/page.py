@@ -114,7 +114,7 @@ def write_page(
     page = [f"<h1>{escape(task).capitalize()}: {escape(head)}</h1>", f"<p>{escape(rest)}</p>"]
     page += [f'<p class="note">{escape(warning)}</p>' for warning in warnings]
     if columns and shown is not None:
-        seen = _clip_column(frames, times, tracks, motion, shown)
+        seen = clip_column(frames, times, tracks, motion, shown)
         done, translated, z = columns
         films = {"the clip": seen, "done again": done, "its translation": translated,
                  "its keypoints": draw_keypoints(translated, z, SCALE)}  # fmt: skip
@@ -177,8 +177,17 @@ def _drawn(frame, tracks=None, i=0):
     return small
 
 
-def _clip_column(frames, times, tracks, motion, shown):
-    """The clip's frames (n, S, S, 3) that belong to the steps of the motion, in black bars."""
+def clip_column(
+    frames: np.ndarray,
+    times: np.ndarray,
+    tracks: Tracks | None,
+    motion: Motion | None,
+    shown: np.ndarray,
+) -> np.ndarray:
+    """The clip's frames (n, S, S, 3) uint8 at the steps shown (n,) of the motion, in black bars.
+
+    frames (T, H, W, 3) uint8, times (T,) s: the clip.
+    """
     out, S = [], 84 * SCALE
     for k in shown:
         t = times[0] + k / FPS

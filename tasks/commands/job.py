@@ -24,8 +24,8 @@ from lbw_minimal.imitate import Perception, Recipe, Run, load_perception
 from lbw_minimal.reward import MENDS
 from lbw_minimal.training import InputError, pick_device, write_atomic
 from tasks.commands import JITTER, Parser, at_least, make_folder, metres
-from tasks.commands.prepare import FILM, PAGE, usable
-from tasks.commands.prepare import write as write_clip
+from tasks.commands.own_clip import bring, folder
+from tasks.commands.prepare import FILM, PAGE, STILLS, usable
 from tasks.commands.record import EXPERTS
 
 TEST_EPISODES = 10  # as in the paper
@@ -38,6 +38,7 @@ RESULTS = (
     "report.html",
     FILM,
     PAGE,
+    STILLS,
 )
 FAST = {
     "munit_iterations": 10,
@@ -91,7 +92,12 @@ def parser(name: str) -> Parser:
     add("--threads", type=at_least(1), help="torch's threads (all cores)")
     add("--fast", action="store_true", help="a smoke run through every stage")
     add("--resume", action="store_true", help="go on with the run in --out")
-    add("--out", type=Path, metavar="DIR", help=f"folder of the run (runs/{name})")
+    add(
+        "--out",
+        type=Path,
+        metavar="DIR",
+        help=f"folder of the run (runs/{name}; with --video also the clip's name)",
+    )
     return p
 
 
@@ -139,7 +145,7 @@ def check(name: str, args: argparse.Namespace, argv: list[str]) -> Job:
         random = read_video(tasks.VIDEOS / name / "random.mp4", whole=True)
     if lbw:  # whose demonstration is one: the translation sees the others beside random motion
         random = np.concatenate([random, *experts[1:]])
-    weights, out = args.weights or tasks.WEIGHTS / name, args.out or Path("runs") / name
+    weights, out = args.weights or tasks.WEIGHTS / name, args.out or folder(name, args.video)
     if weights.resolve() == out.resolve():
         raise InputError(f"{out}: the run would clear it of the weights; give another --out.")
     perception = load_perception(weights, name) if lbw and not from_scratch else None
@@ -169,12 +175,7 @@ def check(name: str, args: argparse.Namespace, argv: list[str]) -> Job:
     machine = f"{platform.machine()}, {os.cpu_count()} cores, torch {torch.__version__}"
     run.metrics["machine"] = machine
     if clip:
-        write_clip(
-            run.out,
-            name,
-            clip,
-            shlex.join(["python", "-m", "tasks", "prepare", name, str(args.video)]),
-        )
+        bring(run.out, name, clip, args.video)
     return Job(name, args, recipe, from_scratch, experts, random, perception, weights, command, run)
 
 
@@ -315,6 +316,8 @@ def prepare_folder(out: Path, settings: dict[str, Any], resume: bool) -> Path:
         return out
     make_folder(out)
     try:
+        if note.exists() and note.read_text(encoding="utf-8") != json.dumps(settings):
+            print(f"note: {out}: an earlier run with other settings is replaced.", file=sys.stderr)
         for pattern in RESULTS if note.exists() else ():  # an older run makes room
             for file in out.glob(pattern):
                 file.unlink()

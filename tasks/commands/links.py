@@ -14,15 +14,24 @@ PAGES = {  # in RUNS, what each is called, and the command that makes it
     "book/index.html": ("the course", "python -m solutions book"),
     "paper/paper.html": ("the paper, made again", "python -m tasks paper"),
 }
+# In a run's folder, who leads where. A clip's page is written before the report, and promises it.
+BESIDE = {
+    "report.html": ("prepare.html", "prepare.html", "the clip of this run"),
+    "prepare.html": ("settings.json", "report.html", "the run on this clip"),
+}
 
 
 def links(page: Path, runs: Path = RUNS) -> str:
     """A list of the kit's other pages, for a page that is written to the path `page`.
 
     Where both lie in the folder `runs` a link leads there, relative, so that the folder can be
-    moved. What is not there yet, or lies elsewhere, is named with its command.
+    moved. What is not there yet, or lies elsewhere, is named with its command. The report of a run
+    and the page of its clip lead to each other.
     """
     here, runs, items = page.resolve(), runs.resolve(), []
+    needs, file, name = BESIDE.get(page.name, ("", "", ""))
+    if needs and page.with_name(needs).exists():
+        items.append(f'<a href="{file}">{name}</a>')
     reports = {f"{task}/report.html": (f"a run of {task}", "") for task in tasks.TASKS}
     for file, (name, command) in (PAGES | reports).items():
         there = runs / file

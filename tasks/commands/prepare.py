@@ -23,18 +23,21 @@ from lbw_minimal import imitate, video
 from lbw_minimal.clips import footage
 from lbw_minimal.clips.detector import Detector, Found, refine
 from lbw_minimal.clips.motion import small
-from lbw_minimal.clips.page import write_page
+from lbw_minimal.clips.page import clip_column, write_page
 from lbw_minimal.clips.patches import mended
 from lbw_minimal.clips.paths import Tracks, Unusable
 from lbw_minimal.clips.reader import Clip, read_clip
 from lbw_minimal.clips.retarget import FPS, Motion, Scene, lay
+from lbw_minimal.clips.stills import write_stills
 from lbw_minimal.pictures import spread
+from lbw_minimal.report import COLUMNS
 from lbw_minimal.training import InputError, write_atomic
 from tasks.commands import Parser, make_folder, within
 from tasks.commands.links import links
 from tasks.world.reenact import Reenactment, reenact
 
 FILM, PAGE = "reenactment.mp4", "prepare.html"
+STILLS = "stills.webp"  # of a clip that was re-enacted, for the report of a run
 SHOWN = 60  # frames of the page's film, which are translated as well: 4 s of work on one core
 OWN = 12  # grey levels: the kit's own films begin with the scene's picture to within 6 of 256
 SLACK = 0.01  # s: the page rounds times to 0.001
@@ -239,6 +242,14 @@ def look(frames: np.ndarray, cuts: Sequence[int] = ()) -> Found:
     return refine(frames, found, cuts)
 
 
+def stills(result: Prepared) -> np.ndarray:
+    """Frames (n, S, S, 3) uint8 of a clip that was re-enacted; none of a film taken as it is."""
+    if result.done is None:
+        return no_frames()
+    clip, shown = result.clip, spread(len(result.film), COLUMNS)
+    return clip_column(clip.frames, clip.times, result.tracks, result.done.motion, shown)
+
+
 def is_own(clip: Clip, first: np.ndarray) -> bool:
     """Whether the clip begins with the frame `first` (84, 84, 3), as the kit's own films do.
 
@@ -273,6 +284,7 @@ def write(out: Path, name: str, result: Prepared, command: str) -> Path:
     shown, columns = None, tuple[np.ndarray, ...]()
     if len(result.film):
         write_atomic(out / FILM, result.file)
+        write_stills(out / STILLS, stills(result))
         perception = imitate.load_perception(tasks.WEIGHTS / name, name)
         shown = spread(len(result.film), SHOWN)
         translated = perception.translate(result.film[shown])

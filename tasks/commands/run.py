@@ -19,12 +19,14 @@ from gymnasium.spaces import Box
 
 import tasks
 from lbw_minimal import classifier, cyclegan, rivals, sac, tracks
+from lbw_minimal.clips.stills import read_stills
 from lbw_minimal.follow import follow
 from lbw_minimal.imitate import PACE, Perception, imitate, learn_perception
 from lbw_minimal.report import wilson, write_report
 from lbw_minimal.training import InputError, counted, peak_memory, seed_everything
 from tasks.commands.job import TEST_EPISODES, Job, check, parser
 from tasks.commands.links import links
+from tasks.commands.prepare import STILLS
 from tasks.commands.probe import PROBE_SEED, probe
 from tasks.world import TaskEnv
 from tasks.world.viewer import mirror
@@ -209,6 +211,7 @@ def report(job: Job, seen: dict[str, Any], first: dict[str, Any], scene: str) ->
         out / "report.html",
         task=job.name,
         **seen,
+        clip=read_stills(out / STILLS),
         log=json.loads(log.read_text(encoding="utf-8"))
         if log.exists()
         else [],  # a replayed policy has none

@@ -1,0 +1,65 @@
+"""A clip of one's own in the folder of a run."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+
+from lbw_minimal.clips.stills import read_stills, write_stills
+from tasks.commands import own_clip
+from tasks.commands.own_clip import bring, folder
+
+
+def test_a_run_on_a_clip_keeps_clear_of_other_runs():
+    assert folder("push", None) == Path("runs/push")
+    assert folder("push", Path("clips/my clip.v2.mp4")) == Path("runs/push-my clip.v2")
+
+
+def test_stills_come_back_in_their_order_and_an_older_clips_are_removed(tmp_path):
+    file = tmp_path / "stills.webp"
+    assert read_stills(file) is None
+    stills = np.stack([np.full((252, 252, 3), (50 * k, 0, 200), np.uint8) for k in range(5)])
+    write_stills(file, stills)
+    back = read_stills(file)
+    assert back.shape == stills.shape and back.dtype == np.uint8
+    colours = np.median(back, axis=(1, 2))  # at the edges the compression mixes neighbours
+    np.testing.assert_allclose(colours, stills[:, 0, 0], atol=2)
+    write_stills(file, stills[:0])
+    assert not file.exists()
+    write_stills(file, stills[:0])
+
+
+def prepared(here):
+    """What `prepare` leaves in a folder, of a clip called my.mp4."""
+    here.mkdir()
+    nav = "<nav><a href='../../gallery/index.html'>all tasks</a></nav>\n"
+    (here / "prepare.html").write_text(f"{nav}Push: usable. <nav>\\1</nav>\n")
+    (here / "stills.webp").write_bytes(b"stills of my.mp4")
+    (here / "reenactment.mp4").write_bytes(b"its motion")
+    return here / "reenactment.mp4"
+
+
+def test_a_film_that_prepare_made_brings_its_page_with_links_of_the_runs_own(tmp_path, monkeypatch):
+    run, film = tmp_path / "run", prepared(tmp_path / "made")
+    run.mkdir()
+    monkeypatch.setattr(own_clip, "links", lambda page: f"<nav>{page.parent.name}</nav>\n")
+    bring(run, "push", SimpleNamespace(done=None, file=b"as it is learnt from"), film)
+    page = (run / "prepare.html").read_text()
+    assert page == "<nav>run</nav>\nPush: usable. <nav>\\1</nav>\n"
+    assert (run / "stills.webp").read_bytes() == b"stills of my.mp4"
+    assert (run / "reenactment.mp4").read_bytes() == b"as it is learnt from"
+
+
+def test_any_other_clip_gets_a_page_of_its_own(tmp_path, monkeypatch):
+    """One that was not made by `prepare`, one alone, and one that had to be done again."""
+    wrote = []
+    monkeypatch.setattr(own_clip, "write", lambda *what: wrote.append(what))
+    own, again = SimpleNamespace(done=None, file=b""), SimpleNamespace(done="motion", file=b"")
+    film = prepared(tmp_path / "made")
+    alone = tmp_path / "reenactment.mp4"
+    for clip, file in ((own, film.with_name("my clip.mp4")), (own, alone), (again, film)):
+        bring(tmp_path, "push", clip, file)
+        command = wrote[-1][-1]
+        assert wrote.pop()[:3] == (tmp_path, "push", clip)
+        quoted = f"'{file}'" if " " in str(file) else f"{file}"
+        assert command == f"python -m tasks prepare push {quoted}"
