@@ -11,10 +11,14 @@ LOCK ?= -c requirements-lock.txt
 TORCH_INDEX ?=
 PIP = $(BIN)/python -m pip install --disable-pip-version-check
 
-.PHONY: push reach test slow peers cluster mutants bench lab notebooks book builds resolve lock clean
+.PHONY: push reach install test slow peers cluster mutants bench lab notebooks book builds resolve \
+    lock clean
 
 push reach: $(VENV)/ready
 	$(BIN)/python -m tasks $@
+
+install: $(VENV)/ready
+	@echo "Installed. Now type:  . $(BIN)/activate"
 
 test: $(VENV)/ready
 	@echo "The tests take 6 to 13 minutes on two cores."
