@@ -42,10 +42,10 @@ def prepared(here):
 def test_a_film_that_prepare_made_brings_its_page_with_links_of_the_runs_own(tmp_path, monkeypatch):
     run, film = tmp_path / "run", prepared(tmp_path / "made")
     run.mkdir()
-    monkeypatch.setattr(own_clip, "links", lambda page: f"<nav>{page.parent.name}</nav>\n")
+    monkeypatch.setattr(own_clip, "links", lambda page: f"<nav>{page.parent.name} \\2</nav>\n")
     bring(run, "push", SimpleNamespace(done=None, file=b"as it is learnt from"), film)
     page = (run / "prepare.html").read_text()
-    assert page == "<nav>run</nav>\nPush: usable. <nav>\\1</nav>\n"
+    assert page == "<nav>run \\2</nav>\nPush: usable. <nav>\\1</nav>\n"
     assert (run / "stills.webp").read_bytes() == b"stills of my.mp4"
     assert (run / "reenactment.mp4").read_bytes() == b"as it is learnt from"
 

@@ -12,6 +12,7 @@ from lbw_minimal.clips.footage import Footage
 from lbw_minimal.clips.page import write_page
 from lbw_minimal.clips.paths import Unusable
 from lbw_minimal.clips.reader import Clip, read_clip
+from lbw_minimal.clips.stills import read_stills
 from lbw_minimal.training import InputError
 from tasks import VIDEOS, bare
 from tasks.__main__ import main
@@ -66,7 +67,11 @@ def test_a_clip_becomes_a_human_video_that_the_kit_takes_as_its_own(filmed, eyes
     assert page.count("data-time=") == 12 and page.count("data:video/webm") == 1
     assert "http" not in page.replace("http://www.w3.org", "")  # it needs no network
 
+    stills = read_stills(tmp_path / "stills.webp")
+    assert stills.shape == (8, 252, 252, 3) and len(np.unique(stills.mean((1, 2, 3)))) > 4
+
     again = prepare.prepare("push", film)
+    assert len(prepare.stills(again)) == 0  # it shows nobody
     assert again.notes[-1].endswith("taken as it is.") and again.motion is None
     assert len(again.film) == len(video.read(film)[0]) > 40
     green, red = again.film[-1, 58:68, 50:66], again.film[0, 55:68, 30:45]

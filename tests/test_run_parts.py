@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from lbw_minimal.clips.stills import write_stills
 from lbw_minimal.imitate import Recipe, Run
 from tasks.commands import controls, probe, record, robustness, run
 
@@ -155,11 +156,17 @@ def test_the_result_is_a_line_with_wins_and_their_interval(tmp_path, monkeypatch
     assert capsys.readouterr().out.splitlines() == [
         "push: 9/10 successes (95% CI 0.60-0.98)", f"report: {tmp_path / 'run' / 'report.html'}",
     ]  # fmt: skip
-    assert page["log"] == [] and page["demo"] == "d" and page["episode"] == {"frames": "f"}
+    assert (
+        page["clip"] is None
+        and page["log"] == []
+        and page["demo"] == "d"
+        and page["episode"] == {"frames": "f"}
+    )
     assert (page["scene_html"], page["command"]) == ("<scene>", "python -m tasks push")
     (job.run.out / "policy_log.json").write_text(json.dumps([{"step": 1}]))
+    write_stills(job.run.out / "stills.webp", np.zeros((3, 8, 8, 3), np.uint8))
     run.report(job, {}, {}, "")
-    assert page["log"] == [{"step": 1}]
+    assert page["log"] == [{"step": 1}] and len(page["clip"]) == 3
 
 
 # What other commands print of what they measure.
