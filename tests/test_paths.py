@@ -174,9 +174,53 @@ def test_progress_is_along_the_way_within_it_and_never_back():
     np.testing.assert_allclose(way, [0, 0.72, 0.72, 0.72, 1, 1])
 
 
-def test_marks_count_as_sure_and_in_the_order_of_their_times():
-    lost = replace(tracks(np.full(11, 50.0)), tip_sure=np.zeros(11))
-    marked = lost.marked("tip", [(30.0, 8.0, 0.4), (10.0, 0.0, 0.0)])
-    np.testing.assert_allclose(marked.tip[[0, 5, 10]], [[10, 0], [20, 4], [30, 8]])
-    assert (marked.tip_sure == 1).all() and (lost.tip_sure == 0).all()
-    assert lost.marked("tip", []) is lost
+def test_between_marks_a_correction_is_interpolated_and_beyond_them_it_fades_in_half_a_second():
+    """At 10 frames a second: 4 pixels at 1.0 s and 8 at 1.4 s, of a tip that rests at 50."""
+    sure = np.full(30, 0.8)
+    sure[[11, 12]] = 0.3  # between two marks
+    whole = tracks(np.full(30, 50.0), sure=sure, rate=10)
+    marked = whole.marked("tip", [(58.0, 50.0, 1.4), (54.0, 50.0, 1.0)])
+    moved = [0.8, 1.6, 2.4, 3.2, 4, 5, 6, 7, 8, 6.4, 4.8, 3.2, 1.6]  # from 0.6 to 1.8 s
+    off = np.zeros(30)
+    off[6:19] = moved
+    np.testing.assert_allclose(marked.tip[:, 0] - 50, off, atol=1e-9)
+    assert (marked.tip[:, 1] == 50).all() and marked.object is whole.object
+    own = np.full(30, 0.8)
+    own[10:15] = 1
+    np.testing.assert_allclose(marked.tip_sure, own, atol=1e-9)
+
+
+def test_frames_that_a_correction_does_not_move_stay_as_they_were_found():
+    """The tip is not sure, and wrong, for a second; then it is right. Three clicks, as a person
+    sets them, mend the beginning: what follows is untouched, and not surer than it was."""
+    t = np.arange(40) / 10
+    sure = np.where(t < 0.95, 0.2, 0.7)
+    sure[30] = 0.1
+    x = np.where(t < 0.95, 5.0, 40.0)
+    x[30] = 90.0
+    marked = tracks(x, sure=sure, rate=10).marked(
+        "tip", [(10.0, 50.0, 0.0), (17.0, 50.0, 0.35), (31.0, 50.0, 0.7)]
+    )
+    np.testing.assert_allclose(marked.tip[10:, 0], x[10:])
+    np.testing.assert_allclose(marked.tip_sure[10:], sure[10:])
+    np.testing.assert_allclose(marked.tip[[0, 2, 7, 8, 9], 0], [10, 14, 31, 34, 37])
+    np.testing.assert_allclose(marked.tip_sure[:10], [1] * 8 + [0.8, 0.6])
+
+
+def test_a_gap_longer_than_half_a_second_is_filled_up_to_the_next_sure_frame():
+    sure = np.ones(30)
+    sure[5:21] = 0.0
+    marked = tracks(np.full(30, 10.0), sure=sure, rate=10).marked("tip", [(40.0, 50.0, 1.0)])
+    at = np.array([4, 7, 10, 15, 19, 20, 21])  # sure: 4 and 21
+    wanted = np.interp(at, [4, 10, 21], [10, 40, 10])
+    np.testing.assert_allclose(marked.tip[at, 0], wanted)
+    np.testing.assert_allclose(marked.tip_sure[at], [1, 0.4, 1, 0, 0, 0, 1], atol=1e-9)
+
+
+def test_marks_alone_make_the_path_where_nothing_was_found():
+    """They count in the order of their times, and of two at one time the later."""
+    lost = replace(tracks(np.full(21, 50.0), rate=20), tip_sure=np.zeros(21))
+    marked = lost.marked("tip", [(30.0, 8.0, 0.4), (99.0, 9.0, 0.0), (10.0, 0.0, 0.0)])
+    np.testing.assert_allclose(marked.tip[[0, 4, 8, 20]], [[10, 0], [20, 4], [30, 8], [30, 8]])
+    np.testing.assert_allclose(marked.tip_sure[[0, 8, 12, 20]], [1, 1, 0.6, 0], atol=1e-9)
+    assert (lost.tip_sure == 0).all() and lost.marked("tip", []) is lost

@@ -240,19 +240,6 @@ def test_a_hit_is_as_fast_as_it_was(speed):
     assert fastest <= HURRY * HIT.step * FPS + 1e-9
 
 
-def test_marks_move_a_path_and_between_them_the_correction_is_interpolated():
-    tracks = clip()
-    one = tracks.marked("tip", [(10.0, 20.0, tracks.times[30])])
-    np.testing.assert_allclose(one.tip[30], [10, 20])
-    np.testing.assert_allclose(one.tip - one.tip[30], tracks.tip - tracks.tip[30])
-    x, y = tracks.object[20]
-    two = tracks.marked(
-        "object", [(*(tracks.object[40] + 8), tracks.times[40]), (x, y, tracks.times[20])]
-    )
-    off = (two.object - tracks.object)[[10, 20, 30, 40, 50], 0]
-    np.testing.assert_allclose(off, [0, 0, 4, 8, 8], atol=1e-9)
-
-
 def test_marks_alone_make_a_path_where_nothing_was_found():
     tracks = clip()
     blind = replace(tracks, object=tracks.object * 0, object_sure=tracks.object_sure * 0)

@@ -19,6 +19,7 @@ FOUND = 0.5  # share of the frames in which the object has to be found
 # The same of the tip: while it rests it is like its clip's median, and told from that by little.
 # In made clips in which an arm hides it, it is found in a quarter at most; else mostly in 0.6.
 TIP_FOUND = 0.3
+FADE = 0.5  # s, for which a correction of what was surely found lasts beyond it
 ELSEWHERE = 0.05  # of the frames: in more of them a thing at rest is not surely seen elsewhere
 LEAST_FRAMES = 8  # of a piece: 0.3 s of a phone's, 0.8 s of a slow webcam's
 LEAST_WAY = 0.04  # of the picture's shorter side: a detector errs by 0.01
@@ -58,19 +59,45 @@ class Tracks:
     def marked(self, name: str, marks: list[tuple[float, float, float]]) -> Tracks:
         """The path `name`, "tip" or "object", moved so that it passes through marks (x, y, s).
 
-        Between two marks the correction is interpolated, and before and after them it stays. Where
-        nothing is sure, the marks alone make the path. All of it counts as sure then.
+        Between the first and the last mark the correction is interpolated, and what is there counts
+        as sure. Beyond them it fades out, and frames that it does not move stay as they were found,
+        with their own sureness. Where nothing is sure, the marks alone make the path. Of two marks
+        at one time the later in the list counts.
         """
         if not marks:
             return self
-        x, y, s = np.array(sorted(marks, key=lambda mark: mark[2])).T
-        sure = getattr(self, f"{name}_sure") >= SURE
-        path = np.zeros((len(self.times), 2))
-        if sure.any():
-            path = interpolate(self.times[sure], getattr(self, name)[sure], self.times)
-        off = np.stack([x, y], 1) - interpolate(self.times, path, s)
-        path = path + interpolate(s, off, self.times)
-        return replace(self, **{name: path, f"{name}_sure": np.ones(len(path))})
+        latest = {when: (x, y) for x, y, when in marks}
+        s = np.array(sorted(latest))
+        t, found, own = self.times, getattr(self, name), getattr(self, f"{name}_sure")
+        sure = own >= SURE
+        path = interpolate(t[sure], found[sure], t) if sure.any() else np.zeros_like(found)
+        off = np.array([latest[when] for when in s]) - interpolate(t, path, s)
+        before, after = _fades_out(t, sure, s[0], -1), _fades_out(t, sure, s[-1], 1)
+        within = np.isfinite([before, *s, after])
+        at = np.array([before, *s, after])[within]
+        moved = (t > before) & (t < after)
+        path = path + interpolate(at, np.pad(off, ((1, 1), (0, 0)))[within], t)
+        away = np.maximum(0, np.maximum(s[0] - t, t - s[-1]))  # (T,) s
+        near = np.maximum(own, 1 - away / FADE)
+        return replace(
+            self,
+            **{
+                name: np.where(moved[:, None], path, found),
+                f"{name}_sure": np.where(moved, near, own),
+            },
+        )
+
+
+def _fades_out(t, sure, mark, way):
+    """The time (s) by which a mark's correction has faded out, before it (way -1) or after it (1).
+
+    A mark where nothing was surely found fills a gap, which ends at the next sure frame; infinity
+    if there is none. One where something was surely found, and wrong, speaks for `FADE` seconds.
+    """
+    if sure[np.abs(t - mark).argmin()]:
+        return mark + way * FADE
+    ahead = way * (t[sure] - mark)
+    return mark + way * ahead[ahead > 0].min(initial=np.inf)
 
 
 def of_a_hand(tracks: Tracks, notes: list[str]) -> Tracks:
