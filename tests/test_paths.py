@@ -14,6 +14,7 @@ from lbw_minimal.clips.paths import (
     median3,
     progress,
     trusted,
+    unsure,
 )
 
 
@@ -40,10 +41,52 @@ def test_the_piece_is_taken_in_which_most_happens_to_what_matters():
     tip = np.concatenate([np.linspace(0, 60, 20), np.linspace(20, 22, 20)])
     thing = np.concatenate([np.full(20, 70.0), np.linspace(20, 50, 20)])
     cut = tracks(tip, thing, cuts=(20,))
-    notes = []
-    assert longest_piece(cut, True, notes).times[0] == 20 / 25
-    assert notes == ["The film is cut 1 times; the piece from 0.8 s to 1.6 s was taken."]
+    warnings = []
+    assert longest_piece(cut, True, warnings).times[0] == 20 / 25
+    assert warnings == ["The clip jumps once, at 0.8 s: only the piece from 0.8 to 1.6 s is used."]
     assert longest_piece(cut, False, []).times[-1] == 19 / 25
+
+
+def test_all_jumps_of_a_clip_are_said():
+    tip = np.concatenate([np.linspace(0, 9, 10), np.linspace(50, 90, 10), np.linspace(0, 9, 10)])
+    for cuts, wanted in (((10, 20), "twice, at 1.0 and 2.0 s"), ((), None)):
+        warnings = []
+        longest_piece(tracks(tip, cuts=cuts, rate=10), True, warnings)
+        assert not (warnings or wanted) or wanted in warnings[0]
+    tip, warnings = np.repeat([0.0, 50, 0, 50], 10) + np.arange(40), []
+    longest_piece(tracks(tip, cuts=(10, 20, 30), rate=10), True, warnings)
+    assert "3 times, at 1.0, 2.0 and 3.0 s" in warnings[0]
+
+
+@pytest.mark.parametrize(
+    ("lost", "said"),
+    [
+        ([(8, 13)], []),  # 0.5 s, and not longer
+        ([(8, 14)], ["The tip was not surely found from 0.8 to 1.4 s: look at these pictures."]),
+        ([(0, 8), (20, 30)], [
+            "The tip was not surely found from 0.0 to 0.8 s: look at these pictures, if the hand "
+            "is in them.",
+            "The tip was not surely found from 2.0 to 2.6 s: look at these pictures.",
+        ]),
+        ([(27, 40)], []),  # after the end
+    ],
+)  # fmt: skip
+def test_what_was_not_surely_found_for_longer_than_half_a_second_is_said(lost, said):
+    sure = np.ones(40)
+    for a, b in lost:
+        sure[a:b] = 0.4
+    seen = replace(tracks(np.arange(40), rate=10), tip_sure=sure)
+    assert unsure(seen, "tip", 1.0, 2.6) == said
+    assert unsure(seen, "object", 1.0, 2.6) == []
+
+
+def test_what_was_not_sure_in_another_piece_is_not_said():
+    sure = np.ones(40)
+    sure[2:12], sure[20:28] = 0.4, 0.4
+    tip = np.where(np.arange(40) < 20, 10.0, 60.0)
+    cut = tracks(tip, sure=sure, cuts=(20,), rate=10)
+    (said,) = unsure(cut, "object", 2.8, 3.9)
+    assert "from 2.0 to 2.8 s: look at these pictures." in said
 
 
 @pytest.mark.parametrize(("touched", "last"), [(False, 25), (True, 27)])

@@ -127,7 +127,7 @@ def test_a_loop_that_begins_in_its_middle_is_cut_where_it_jumps():
     turned = np.roll(np.arange(len(t)), 10)  # the last ten frames come first
     tracks = seen(tuple(x[turned] for x in push(t)), t, cuts=(10,))
     motion = lay(tracks, SCENE)
-    assert motion.times[0] >= t[10] and "cut 1 times" in motion.notes[0]
+    assert motion.times[0] >= t[10] and "jumps once, at 0.3 s" in motion.warnings[0]
     world = lambda seconds: push(seconds - 10 / 30)  # noqa: E731
     assert at(motion, world, PUSHING + 10 / 30)[:, 0].max() < 0.012
 
@@ -153,7 +153,27 @@ def test_an_object_that_is_hidden_for_a_while_is_said():
     tracks = clip()
     hidden = (tracks.times > 1.2) & (tracks.times < 1.8)
     motion = lay(replace(tracks, object_sure=np.where(hidden, 0.2, 1.0)), SCENE)
-    assert motion.warnings == ["The object is not seen for 0.6 s; an even way was assumed."]
+    assert motion.warnings == [
+        "The object was not surely found from 1.2 to 1.8 s: look at these pictures."
+    ]
+
+
+def test_a_tip_that_is_lost_on_its_way_is_said_and_one_lost_after_it_is_not():
+    tracks = clip()
+    for first, last, said in ((1.2, 1.9, ["The tip was"]), (2.0, 3.0, [])):
+        lost = (tracks.times > first) & (tracks.times < last)
+        motion = lay(replace(tracks, tip_sure=np.where(lost, 0.2, 1.0)), SCENE)
+        assert [warning[:11] for warning in motion.warnings] == said
+
+
+def test_a_hand_that_leaves_after_a_hit_is_not_missed():
+    t = np.arange(0, 2.5, 1 / 30)
+    tracks = seen(hit(t, 0.4), t)
+    motion = lay(tracks, HIT)
+    gone = tracks.times > motion.times[motion.contact] + 0.1
+    assert gone.mean() > 0.2
+    left = lay(replace(tracks, tip_sure=np.where(gone, 0.2, 1.0)), HIT)
+    assert not [said for said in left.warnings if "surely" in said]
 
 
 def test_a_single_glitch_is_taken_out():

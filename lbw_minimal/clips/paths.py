@@ -20,6 +20,7 @@ FOUND = 0.5  # share of the frames in which the object has to be found
 # In made clips in which an arm hides it, it is found in a quarter at most; else mostly in 0.6.
 TIP_FOUND = 0.3
 FADE = 0.5  # s, for which a correction of what was surely found lasts beyond it
+UNSURE = 0.5  # s, longer than a glitch of the detector
 ELSEWHERE = 0.05  # of the frames: in more of them a thing at rest is not surely seen elsewhere
 LEAST_FRAMES = 8  # of a piece: 0.3 s of a phone's, 0.8 s of a slow webcam's
 LEAST_WAY = 0.04  # of the picture's shorter side: a detector errs by 0.01
@@ -113,14 +114,14 @@ def of_a_hand(tracks: Tracks, notes: list[str]) -> Tracks:
     return replace(tracks, tip=tracks.object, tip_sure=tracks.object_sure)
 
 
-def longest_piece(tracks: Tracks, touched: bool, notes: list[str]) -> Tracks:
+def longest_piece(tracks: Tracks, touched: bool, warnings: list[str]) -> Tracks:
     """The piece between cuts in which most happens, from where the hand is first seen to where
     hand or object is last seen.
 
     A cut is a frame at which the picture changes all at once, and tip or object jump. Most happens
     where the object goes farthest, or the tip where nothing is touched.
     """
-    cuts = [c for c in tracks.cuts if _jumps(tracks, c)]
+    cuts = _cuts(tracks)
     pieces = []
     for first, last in zip([0, *cuts], [*cuts, len(tracks.times)], strict=True):
         seen = first + np.flatnonzero(tracks.tip_sure[first:last] >= SURE)
@@ -139,9 +140,36 @@ def longest_piece(tracks: Tracks, touched: bool, notes: list[str]) -> Tracks:
         )
     best = max(pieces, key=lambda piece: _extent(piece, "object" if touched else "tip"))
     if cuts:
-        at = f"{best.times[0]:.1f} s to {best.times[-1]:.1f} s"
-        notes.append(f"The film is cut {len(cuts)} times; the piece from {at} was taken.")
+        *most, last = (f"{tracks.times[c]:.1f}" for c in cuts)
+        at = f"{', '.join(most)} and {last}" if most else last
+        often = {1: "once", 2: "twice"}.get(len(cuts), f"{len(cuts)} times")
+        warnings.append(
+            f"The clip jumps {often}, at {at} s: only the piece from {best.times[0]:.1f} to "
+            f"{best.times[-1]:.1f} s is used."
+        )
     return best
+
+
+def unsure(tracks: Tracks, name: str, first: float, last: float) -> list[str]:
+    """A sentence for each stretch longer than `UNSURE` seconds in which the tip or the object,
+    `name`, was not surely found, in the piece that is seen at `first` and goes on to `last` (s)."""
+    t, sure = tracks.times, getattr(tracks, f"{name}_sure") >= SURE
+    start = max([0, *(c for c in _cuts(tracks) if t[c] <= first)])
+    stop = int(np.searchsorted(t, last))  # its frame, or the first one after it
+    edges = np.flatnonzero(np.diff(sure[start:stop], prepend=True, append=True)) + start
+    said = []
+    for a, b in zip(edges[::2], np.minimum(edges[1::2], len(t) - 1), strict=True):
+        if t[b] - t[a] > UNSURE:
+            early = ", if the hand is in them" if name == "tip" and a == start else ""
+            said.append(
+                f"The {name} was not surely found from {t[a]:.1f} to {t[b]:.1f} s: look at these "
+                f"pictures{early}."
+            )
+    return said
+
+
+def _cuts(tracks):
+    return [c for c in tracks.cuts if _jumps(tracks, c)]
 
 
 def _jumps(tracks, c):

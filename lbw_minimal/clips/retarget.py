@@ -28,6 +28,7 @@ from lbw_minimal.clips.paths import (
     of_a_hand,
     progress,
     trusted,
+    unsure,
 )
 from lbw_minimal.clips.pushing import check_way, gets_faster
 
@@ -41,7 +42,6 @@ RUN_UP = 2.0  # s before a hit that are kept
 LITTLE = 0.1
 LONGEST = 12.0  # s, the longest horizon of the tasks; only a hit cannot be hurried
 STEEP = 1.0  # height over width of the way; steeper, and it is not seen from the side
-UNSEEN = 0.4  # s, longer than a glitch of the detector
 CARRIED = 0.85  # of its way: a hand that goes along so far has not hit
 OUTSIDE = 0.02  # m out of the tip's box; until then the approach stands in for the clip
 TOO_FAST = 1.5  # times what it may ask for: slowed down by more is worth a warning
@@ -92,15 +92,11 @@ def lay(tracks: Tracks, scene: Scene, mirror: bool | None = None) -> Motion:
     touched = scene.contact is not None
     if not touched:
         tracks = of_a_hand(tracks, notes)
-    tracks = longest_piece(tracks, touched, notes)
+    whole, tracks = tracks, longest_piece(tracks, touched, warnings)
     t = np.arange(tracks.times[0], tracks.times[-1] + 1e-9, 1 / FPS)
     tip = thing = low_pass(*trusted(tracks, "tip"), t)  # (N, 2) pixels
     if touched:
-        seen, points = trusted(tracks, "object")
-        thing = low_pass(seen, points, t)
-        gap = float(np.diff(seen).max())
-        if gap > UNSEEN:
-            warnings.append(f"The object is not seen for {gap:.1f} s; an even way was assumed.")
+        thing = low_pass(*trusted(tracks, "object"), t)
     what, least = ("object", LEAST_WAY) if touched else ("hand", LITTLE)
     start, end = ends(thing, least * tracks.side, what)
     if gets_faster(thing):
@@ -125,6 +121,8 @@ def lay(tracks: Tracks, scene: Scene, mirror: bool | None = None) -> Motion:
         object_ = None
         x[j:] = x[j]
         _check_reach(x, scene)
+    warnings += unsure(whole, "tip", t[0], t[i if scene.hit else j])
+    warnings += unsure(whole, "object", t[0], t[j]) if touched else []
     first, last = _first_step(x, i, scene), j + 1 + round(REST * FPS)
     notes += _left_out(t, first, last)
     notes += _rests(x[first : j + 1])
