@@ -50,13 +50,15 @@ def test_a_usable_clip_is_told_with_its_warnings_and_how_to_learn_from_it(
     command = (
         f"python -m tasks prepare push '{file}' --from 1 --tip 3,4@1.5 --no-mirror --out {out}"
     )
-    assert asked == [("push", file, choices), ("push", result, command)]
+    learn = f"python -m tasks push --video {out / 'reenactment.mp4'}"
+    assert asked == [("push", file, choices), ("push", result, command, learn)]
     assert capsys.readouterr().out.splitlines() == [
         "usable, with 2 warnings", f"page: {out / 'page'}", "warning: It is dark.",
-        "warning: It is far.", f"learn: python -m tasks push --video {out / 'reenactment.mp4'}",
+        "warning: It is far.", f"learn: {learn}",
     ]  # fmt: skip
     result.why_not = "no arm is seen."
     assert prepare.main(argv) == 2 and "learn:" not in capsys.readouterr().out
+    assert asked[-1] == ("push", result, command, "")
 
 
 def test_a_run_on_a_clip_says_what_is_odd_about_it_or_why_it_is_none(tmp_path, monkeypatch, capsys):

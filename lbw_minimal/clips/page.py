@@ -16,7 +16,7 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from lbw_minimal.clips.paths import SURE, Tracks
+from lbw_minimal.clips.paths import FADE, SURE, Tracks
 from lbw_minimal.clips.retarget import FPS, Motion, Scene
 from lbw_minimal.films import Film
 from lbw_minimal.pictures import (
@@ -39,29 +39,72 @@ TIP, OBJECT = (213, 94, 0), (86, 180, 233)  # Okabe and Ito's vermilion and sky 
 STRIP = """
 .clip { display: grid; grid-template-columns: repeat(auto-fill, minmax(11rem, 1fr)); gap: .6rem }
 .clip figure { margin: 0 }
-.clip img { width: 100%; cursor: crosshair }
+.clip img { width: 100%; display: block; cursor: crosshair }
+.clip .unused img { filter: grayscale(1) opacity(.4) }
+.shot { display: block; position: relative }
+.click { position: absolute; width: 12px; height: 12px; margin: -6px; border: 2px solid #000;
+         border-radius: 50%; pointer-events: none }
 """
-CLICK = """
-<p>Vermilion is the tip of the hand, sky blue the object; a hollow ring was not sure. Is one of them
-wrong? Click where it should be, in that frame, and run the command below. Two or three frames are
-enough: between them the correction is interpolated.</p>
-<p><label><input type="radio" name="what" value="tip" checked> tip</label>
-<label><input type="radio" name="what" value="object"> object</label></p>
+
+
+def _dot(colour, hollow=False):
+    """A dot of the legend, as HTML."""
+    ink = f"rgb{colour}"
+    fill = "none" if hollow else ink
+    return (
+        '<svg width="14" height="14" aria-hidden="true"><circle cx="7" cy="7" r="5" '
+        f'fill="{fill}" stroke="{ink}" stroke-width="2"/></svg>'
+    )
+
+
+LEGEND = f"""
+<p>{_dot(TIP)} Orange is the tip of the hand, {_dot(OBJECT)} sky blue the object. A full dot was
+surely found, a hollow one {_dot(TIP, True)} {_dot(OBJECT, True)} was not. The tip is the foremost
+point of the hand, or of a tool in it, that touches the object, also where the hand holds or covers
+it. Grey pictures are not used.</p>
+"""
+CLICK = f"""
+<p>Is a dot wrong? Choose which, click where it should be, and run the command below. Another click
+into the same picture replaces the first. Two or three pictures are enough: between your first and
+your last click the correction is interpolated. Beyond them it fades out: within {FADE:g} s where
+the dot was full, and by the next full dot where it was hollow. All else stays as it was found. So
+click also on a dot that is right, where a correction should end.</p>
+<p><label><input type="radio" name="what" value="tip" checked> {_dot(TIP)} tip</label>
+<label><input type="radio" name="what" value="object"> {_dot(OBJECT)} object</label></p>
 """
 SCRIPT = """
 <pre id="command"></pre>
+<p><button id="copy">Copy</button> <button id="again">Start again</button></p>
 <script>
-const base = %s, marks = [];
-const pre = document.getElementById("command");
-pre.textContent = base;
+const base = %s, colours = %s, marks = new Map();
+const [pre, copy, again] = ["command", "copy", "again"].map(id => document.getElementById(id));
+const show = () => {
+  pre.textContent = [base, ...[...marks.values()].map(mark => mark.option)].join(" ");
+  copy.textContent = "Copy";
+};
 document.querySelectorAll(".clip img").forEach(img => img.addEventListener("click", e => {
   const what = document.querySelector("[name=what]:checked").value;
-  const box = img.getBoundingClientRect();
-  const x = Math.max(0, (e.clientX - box.left) / box.width * img.dataset.width);
-  const y = Math.max(0, (e.clientY - box.top) / box.height * img.dataset.height);
-  marks.push(`--${what} ${x.toFixed(0)},${y.toFixed(0)}@${img.dataset.time}`);
-  pre.textContent = [base, ...marks].join(" ");
+  const box = img.getBoundingClientRect(), key = what + img.dataset.time;
+  const x = Math.min(1, Math.max(0, (e.clientX - box.left) / box.width));
+  const y = Math.min(1, Math.max(0, (e.clientY - box.top) / box.height));
+  const place = [x * img.dataset.width, y * img.dataset.height].map(v => v.toFixed(0));
+  const dot = marks.get(key)?.dot ?? document.createElement("i");
+  dot.className = "click";
+  dot.style = `left: ${100 * x}%%; top: ${100 * y}%%; background: ${colours[what]}`;
+  img.after(dot);
+  marks.set(key, {dot, option: `--${what} ${place}@${img.dataset.time}`});
+  show();
 }));
+again.addEventListener("click", () => {
+  marks.forEach(mark => mark.dot.remove());
+  marks.clear();
+  show();
+});
+copy.addEventListener("click", () => {  // the newer way asks for a secure page
+  getSelection().selectAllChildren(pre);
+  if (document.execCommand("copy")) copy.textContent = "Copied";
+});
+show();
 </script>
 """
 OPTIONS = [
@@ -102,13 +145,14 @@ def write_page(
     columns: tuple[np.ndarray, ...] = (),
     shown: np.ndarray | None = None,
     links: str = "",
+    learn: str = "",
 ) -> None:
     """Write the page, whole or not at all; what is None was not reached and is left out.
 
     command: what made it; verdict: the sentence on top. frames (T, H, W, 3) uint8, times (T,) s:
     the clip. states (N, 9) m: tip, object and target of the re-enactment. shown (n,): the steps of
     the motion in the film; columns: its re-enactment and translation (n, 84, 84, 3) uint8 and
-    keypoints (n, K, 2). links: HTML that leads to other pages.
+    keypoints (n, K, 2). links: HTML that leads to other pages. learn: the command that comes next.
     """
     head, _, rest = verdict.partition(": ")
     page = [f"<h1>{escape(task).capitalize()}: {escape(head)}</h1>", f"<p>{escape(rest)}</p>"]
@@ -124,8 +168,11 @@ def write_page(
             Film(films, _rate(shown) / 2).html(),
         )
     if tracks is not None:
-        page += section("What was found in the clip", CLICK, clip_frames(frames, times, tracks),
-                        SCRIPT % json.dumps(command).replace("<", "\\u003c"))  # fmt: skip
+        colours = {"tip": f"rgb{TIP}", "object": f"rgb{OBJECT}"}
+        script = SCRIPT % (json.dumps(command).replace("<", "\\u003c"), json.dumps(colours))
+        used = (-np.inf, np.inf) if motion is None else (motion.times[0], motion.times[-1])
+        shots = clip_frames(frames, times, tracks, used)
+        page += section("What was found in the clip", LEGEND, CLICK, shots, script)
         page.append(picture(svg(confidence(tracks)), "How sure tip and object were found"))
     if notes:
         page += section(
@@ -136,6 +183,8 @@ def write_page(
         page += section("The motion in the scene", SCENE, picture(svg(figure), "Paths over time"))
     again = f"<pre>{escape(command)}</pre>" if tracks is None else ""
     page += section("To decide otherwise", table(OPTIONS), again)
+    if learn:
+        page += section("Next", "<p>The robot learns it:</p>", f"<pre>{escape(learn)}</pre>")
     title = f"{escape(task)}: a clip of one's own"
     body = "".join(page)
     write_atomic(path, HTML.format(title=title, css=CSS + STRIP, links=links, body=body))
@@ -146,18 +195,27 @@ def nearest(times: np.ndarray, t: float) -> int:
     return int(np.abs(times - t).argmin())
 
 
-def clip_frames(frames: np.ndarray, times: np.ndarray, tracks: Tracks) -> str:
-    """Frames of the clip with tip and object drawn on them, which know where they are clicked."""
-    figures = []
+def clip_frames(
+    frames: np.ndarray, times: np.ndarray, tracks: Tracks, used: tuple[float, float]
+) -> str:
+    """Frames of the clip with tip and object drawn on them, which know where they are clicked.
+
+    used: the first and the last second that the motion shows; frames outside are grey.
+    """
+    figures, slack = [], 0.5 * float(np.median(np.diff(tracks.times)))
     for i in spread(len(tracks.times), FRAMES):
         t = tracks.times[i]
         frame = frames[nearest(times, t)]
         image = cv2.imencode(".webp", _drawn(frame, tracks, i)[..., ::-1])[1].tobytes()
         size = f'data-width="{frame.shape[1]}" data-height="{frame.shape[0]}"'
-        caption = f"{t:.2f} s; sure: {tracks.tip_sure[i]:.0%}, {tracks.object_sure[i]:.0%}"
+        inside = used[0] - slack <= t <= used[1] + slack
+        caption = f"{t:.2f} s; sure: tip {tracks.tip_sure[i]:.0%}, object "
+        caption += f"{tracks.object_sure[i]:.0%}" + ("" if inside else "; not used")
         figures.append(
-            f'<figure><img alt="Frame at {t:.2f} s" data-time="{t:.3f}" {size} '
-            f'src="{data_uri("image/webp", image)}"><figcaption>{caption}</figcaption></figure>'
+            f'<figure{"" if inside else " class=unused"}><span class="shot">'
+            f'<img alt="Frame at {t:.2f} s" data-time="{t:.3f}" {size} '
+            f'src="{data_uri("image/webp", image)}"></span>'
+            f"<figcaption>{caption}</figcaption></figure>"
         )
     return f'<div class="clip">{"".join(figures)}</div>'
 

@@ -143,13 +143,15 @@ def main(argv: list[str]) -> int:
         print(f"not usable: {error}")
         return 2
     make_folder(out)
-    page = write(out, args.task, result, shlex.join(["python", "-m", "tasks", "prepare", *argv]))
+    learn = shlex.join(["python", "-m", "tasks", args.task, "--video", str(out / FILM)])
+    command = shlex.join(["python", "-m", "tasks", "prepare", *argv])
+    page = write(out, args.task, result, command, "" if result.why_not else learn)
     print(f"{result.verdict}\npage: {page}")
     for warning in result.warnings:
         print(f"warning: {warning}")
     if result.why_not:
         return 2
-    print(f"learn: python -m tasks {args.task} --video {out / FILM}")
+    print(f"learn: {learn}")
     return 0
 
 
@@ -279,8 +281,11 @@ def keep(result: Prepared, frames: np.ndarray) -> None:
         result.file, result.film = path.read_bytes(), video.read(path)[0]
 
 
-def write(out: Path, name: str, result: Prepared, command: str) -> Path:
-    """Write the page, and the film of a usable clip, into the folder `out`. Returns the page."""
+def write(out: Path, name: str, result: Prepared, command: str, learn: str = "") -> Path:
+    """Write the page, and the film of a usable clip, into the folder `out`. Returns the page.
+
+    command: what made them; learn: the command that comes next, if there is one.
+    """
     shown, columns = None, tuple[np.ndarray, ...]()
     if len(result.film):
         write_atomic(out / FILM, result.file)
@@ -295,6 +300,6 @@ def write(out: Path, name: str, result: Prepared, command: str) -> Path:
         times=clip.times, scene=result.scene, notes=result.notes, warnings=result.warnings,
         tracks=result.tracks, motion=result.done.motion if result.done else result.motion,
         states=result.done.recording.states if result.done else None, columns=columns, shown=shown,
-        links=links(page),
+        links=links(page), learn=learn,
     )  # fmt: skip
     return page

@@ -1,0 +1,149 @@
+"""The page of `prepare` in a browser: what a click into a frame of the clip does."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from lbw_minimal.clips.page import clip_frames, write_page
+from lbw_minimal.clips.paths import Tracks
+from tests import browser
+from tests.test_pages import AUDIT, FINE, PHONE, WIDE
+
+COMMAND = "python -m tasks prepare push 'my push.mp4' --out runs/a"
+LEARN = "python -m tasks push --video runs/a/reenactment.mp4"
+N = 12  # frames, 10 a second, all of which the page shows
+CLICK = """
+(what, i, x, y) => {
+  document.querySelector(`[value=${what}]`).click();
+  const img = document.querySelectorAll(".clip img")[i], box = img.getBoundingClientRect();
+  const [clientX, clientY] = [box.left + x * box.width, box.top + y * box.height];
+  img.dispatchEvent(new MouseEvent("click", {clientX, clientY, bubbles: true}));
+}
+"""
+# An event made by a script has whole pixels: each frame gets 160x120 of them.
+WHOLE = """
+.clip { position: absolute; left: 0; top: 0; width: 160px; display: block }
+.clip img { height: 120px } .clip figcaption { height: 20px; font-size: 5px }
+"""
+STATE = """
+({command: document.getElementById("command").textContent,
+  copy: document.getElementById("copy").textContent,
+  dots: [...document.querySelectorAll(".clip .click")].map(dot => {
+    const [a, b] = [dot, dot.parentElement.querySelector("img")]
+      .map(e => e.getBoundingClientRect());
+    return [dot.parentElement.querySelector("img").dataset.time,
+      getComputedStyle(dot).backgroundColor,
+      (a.left + a.width / 2 - b.left) / b.width, (a.top + a.height / 2 - b.top) / b.height];
+  })})
+"""
+
+
+def clip():
+    """A grey clip of 320x240 pixels and what was found in it: the tip, not surely at first."""
+    frames, times = np.full((N, 240, 320, 3), 120, np.uint8), np.arange(N) / 10
+    sure = np.where(times < 0.35, 0.2, 0.9)
+    path = np.stack([20.0 * np.arange(N) + 20, np.full(N, 100.0)], 1)
+    return frames, times, Tracks(times, path, path + 40, sure, np.ones(N), 240)
+
+
+def write(folder):
+    frames, times, tracks = clip()
+    write_page(
+        folder / "prepare.html", task="push", command=COMMAND, verdict="usable, with a warning",
+        frames=frames, times=times, scene=SimpleNamespace(), notes=["It was dark."],
+        warnings=["The clip jumps once."], tracks=tracks, learn=LEARN,
+    )  # fmt: skip
+
+
+async def look(folder):
+    """The page before a click, after each, and after each button."""
+    states = {}
+    async with browser.opened(
+        folder / "prepare.html", folder / "profile", "--hide-scrollbars"
+    ) as page:
+        await page.until("document.readyState", "complete")
+        await page.js('addEventListener("copy", () => window.copied = getSelection().toString())')
+        await page.js(f"document.head.insertAdjacentHTML('beforeend', `<style>{WHOLE}</style>`)")
+        states["first"] = await page.js(STATE)
+        for name, click in {
+            "tip": "'tip', 2, 0.25, 0.5", "again": "'tip', 2, 0.5, 0.75",
+            "object": "'object', 2, 1, 0.5", "edge": "'tip', 7, 1.2, -0.2",
+        }.items():  # fmt: skip
+            await page.js(f"({CLICK})({click})")
+            states[name] = await page.js(STATE)
+        await page.call(
+            "Runtime.evaluate", expression='document.getElementById("copy").click()',
+            userGesture=True,
+        )  # fmt: skip
+        states["copied"] = await page.js("window.copied"), (await page.js(STATE))["copy"]
+        await page.js("document.head.lastElementChild.remove()")
+        for width, theme in ((WIDE, "light"), (PHONE, "light"), (WIDE, "dark")):
+            size = {"width": width, "height": 900, "deviceScaleFactor": 1}
+            await page.call("Emulation.setDeviceMetricsOverride", mobile=width == PHONE, **size)
+            night = [{"name": "prefers-color-scheme", "value": theme}]
+            await page.call("Emulation.setEmulatedMedia", features=night)
+            states[width, theme] = await page.js(AUDIT)
+        await page.js('document.getElementById("again").click()')
+        states["none"] = await page.js(STATE)
+        states["end"] = await page.js(
+            '[...document.querySelectorAll("section")].at(-1).innerText.split("\\n")'
+        )
+    return states
+
+
+@pytest.fixture(scope="module")
+def seen(tmp_path_factory):
+    return browser.seen(tmp_path_factory, write, look)
+
+
+TIP, OBJECT = "rgb(213, 94, 0)", "rgb(86, 180, 233)"
+
+
+def places(state):
+    return [(when, colour, round(x, 2), round(y, 2)) for when, colour, x, y in state["dots"]]
+
+
+def test_a_click_writes_an_option_and_draws_a_dot_in_the_colour_of_its_thing(seen):
+    assert seen["first"] == {"command": COMMAND, "copy": "Copy", "dots": []}
+    assert seen["tip"]["command"] == f"{COMMAND} --tip 80,120@0.200"
+    assert places(seen["tip"]) == [("0.200", TIP, 0.25, 0.5)]
+
+
+def test_a_second_click_for_the_same_thing_in_a_frame_replaces_the_first(seen):
+    assert seen["again"]["command"] == f"{COMMAND} --tip 160,180@0.200"
+    assert places(seen["again"]) == [("0.200", TIP, 0.5, 0.75)]
+
+
+def test_clicks_for_both_things_and_into_several_frames_add_up(seen):
+    both = f"{COMMAND} --tip 160,180@0.200 --object 320,120@0.200"
+    assert seen["object"]["command"] == both
+    assert sorted(places(seen["object"])) == [
+        ("0.200", TIP, 0.5, 0.75), ("0.200", OBJECT, 1, 0.5)
+    ]  # fmt: skip
+    assert seen["edge"]["command"] == f"{both} --tip 320,0@0.700"  # no place outside of the frame
+    assert places(seen["edge"])[-1] == ("0.700", TIP, 1, 0)
+
+
+def test_the_command_is_copied_and_the_clicks_can_be_taken_back(seen):
+    assert seen["copied"] == (seen["edge"]["command"], "Copied")
+    assert seen["none"] == seen["first"]
+
+
+def test_the_page_ends_with_what_comes_next(seen):
+    assert seen["end"][0] == "Next" and seen["end"][-1] == LEARN
+
+
+@pytest.mark.parametrize("how", [(WIDE, "light"), (PHONE, "light"), (WIDE, "dark")])
+def test_the_page_can_be_read(seen, how):
+    assert seen[how] == FINE
+
+
+def test_pictures_outside_of_what_is_used_are_grey_and_say_so():
+    frames = clip_frames(*clip(), (0.3, 0.82)).split("<figure")[1:]
+    grey = ["class=unused" in frame for frame in frames]
+    assert grey == [not 3 <= i <= 8 for i in range(N)]
+    assert ["; not used" in frame for frame in frames] == grey
+    assert "sure: tip 20%, object 100%" in frames[3] and not any(
+        "unused" in frame for frame in clip_frames(*clip(), (-np.inf, np.inf)).split("<figure")
+    )
