@@ -260,6 +260,17 @@ def test_a_gap_longer_than_half_a_second_is_filled_up_to_the_next_sure_frame():
     np.testing.assert_allclose(marked.tip_sure[at], [1, 0.4, 1, 0, 0, 0, 1], atol=1e-9)
 
 
+def test_a_correction_does_not_go_beyond_a_cut():
+    """Clicks at 0.7 s and 1.3 s, each on a sure dot, and a cut at 1.0 s, with a jump by 40."""
+    x = np.where(np.arange(20) < 10, 10.0, 50.0)
+    whole = tracks(x, sure=np.full(20, 0.8), cuts=(10,), rate=10)
+    marked = whole.marked("tip", [(20.0, 50.0, 0.7)])
+    np.testing.assert_allclose(marked.tip[7:10, 0], [20, 18, 16])
+    assert (marked.tip[10:] == whole.tip[10:]).all() and (marked.tip_sure[10:] == 0.8).all()
+    both = whole.marked("tip", [(20.0, 50.0, 0.7), (70.0, 50.0, 1.3)])
+    np.testing.assert_allclose(both.tip[7:14, 0], [20, 18, 16, 58, 62, 66, 70])
+
+
 def test_marks_alone_make_the_path_where_nothing_was_found():
     """They count in the order of their times, and of two at one time the later."""
     lost = replace(tracks(np.full(21, 50.0), rate=20), tip_sure=np.zeros(21))

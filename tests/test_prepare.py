@@ -242,7 +242,7 @@ def test_what_was_found_is_laid_by_the_clips_shorter_side_cuts_and_marks(monkeyp
     follow(result, choices)
     tracks = laid["tracks"]
     assert (tracks.side, tracks.cuts, laid["scene"], laid["mirror"]) == (90, (4,), "scene", True)
-    assert tracks.tip[2].tolist() == [10, 20] and tracks.object[2].tolist() == [30, 40]
+    assert tracks.tip[2].tolist() == [10, 20] and tracks.object[4].tolist() == [30, 40]
     assert (tracks.enters, tracks.unmoved) == (0.2, True)
     assert result.warnings == ["cut at [4]"] and result.tracks is tracks
     assert result.notes[0].startswith("6 frames at 20 a second")

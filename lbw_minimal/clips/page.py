@@ -67,8 +67,8 @@ CLICK = f"""
 <p>Is a dot wrong? Choose which, click where it should be, and run the command below. Another click
 into the same picture replaces the first. Two or three pictures are enough: between your first and
 your last click the correction is interpolated. Beyond them it fades out: within {FADE:g} s where
-the dot was full, and by the next full dot where it was hollow. All else stays as it was found. So
-click also on a dot that is right, where a correction should end.</p>
+the dot was full, by the next full dot where it was hollow, and where the clip jumps. All else stays
+as it was found. So click also on a dot that is right, where a correction should end.</p>
 <p><label><input type="radio" name="what" value="tip" checked> {_dot(TIP)} tip</label>
 <label><input type="radio" name="what" value="object"> {_dot(OBJECT)} object</label></p>
 """

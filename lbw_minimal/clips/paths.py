@@ -7,6 +7,7 @@ the clip, at any times one asks for. Nothing of this is in the paper.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -62,31 +63,37 @@ class Tracks:
 
         Between the first and the last mark the correction is interpolated, and what is there counts
         as sure. Beyond them it fades out, and frames that it does not move stay as they were found,
-        with their own sureness. Where nothing is sure, the marks alone make the path. Of two marks
-        at one time the later in the list counts.
+        with their own sureness. It does not go beyond a cut. Where nothing is sure, the marks alone
+        make the path. Of two marks at one time the later in the list counts.
         """
         if not marks:
             return self
-        latest = {when: (x, y) for x, y, when in marks}
-        s = np.array(sorted(latest))
-        t, found, own = self.times, getattr(self, name), getattr(self, f"{name}_sure")
-        sure = own >= SURE
-        path = interpolate(t[sure], found[sure], t) if sure.any() else np.zeros_like(found)
-        off = np.array([latest[when] for when in s]) - interpolate(t, path, s)
-        before, after = _fades_out(t, sure, s[0], -1), _fades_out(t, sure, s[-1], 1)
-        within = np.isfinite([before, *s, after])
-        at = np.array([before, *s, after])[within]
-        moved = (t > before) & (t < after)
-        path = path + interpolate(at, np.pad(off, ((1, 1), (0, 0)))[within], t)
-        away = np.maximum(0, np.maximum(s[0] - t, t - s[-1]))  # (T,) s
-        near = np.maximum(own, 1 - away / FADE)
-        return replace(
-            self,
-            **{
-                name: np.where(moved[:, None], path, found),
-                f"{name}_sure": np.where(moved, near, own),
-            },
-        )
+        path, sure = getattr(self, name).copy(), getattr(self, f"{name}_sure").copy()
+        latest = {s: (x, y, s) for x, y, s in marks}
+        frame = {s: int(np.abs(self.times - s).argmin()) for s in latest}
+        for first, last in pairwise([0, *_cuts(self), len(path)]):
+            part = slice(first, last)
+            inside = np.array([latest[s] for s in sorted(latest) if first <= frame[s] < last])
+            if len(inside):
+                path[part], sure[part] = _corrected(
+                    self.times[part], path[part], sure[part], inside
+                )
+        return replace(self, **{name: path, f"{name}_sure": sure})
+
+
+def _corrected(t, found, own, marks):
+    """A path found (T, 2) and its sureness (T,), as `Tracks.marked` corrects them in one piece."""
+    s, sure = marks[:, 2], own >= SURE
+    path = interpolate(t[sure], found[sure], t) if sure.any() else np.zeros_like(found)
+    off = marks[:, :2] - interpolate(t, path, s)
+    before, after = _fades_out(t, sure, s[0], -1), _fades_out(t, sure, s[-1], 1)
+    within = np.isfinite([before, *s, after])
+    at = np.array([before, *s, after])[within]
+    moved = (t > before) & (t < after)
+    path = path + interpolate(at, np.pad(off, ((1, 1), (0, 0)))[within], t)
+    away = np.maximum(0, np.maximum(s[0] - t, t - s[-1]))  # (T,) s
+    near = np.maximum(own, 1 - away / FADE)
+    return np.where(moved[:, None], path, found), np.where(moved, near, own)
 
 
 def _fades_out(t, sure, mark, way):
