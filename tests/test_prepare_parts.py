@@ -7,7 +7,7 @@ import pytest
 
 from lbw_minimal.clips.detector import Found
 from lbw_minimal.clips.footage import Footage
-from lbw_minimal.clips.paths import Unusable
+from lbw_minimal.clips.paths import Tracks, Unusable
 from lbw_minimal.clips.reader import Clip
 from lbw_minimal.training import InputError
 from tasks.commands import prepare
@@ -144,3 +144,21 @@ def test_the_scene_is_closed_whatever_becomes_of_the_clip(monkeypatch):
     with pytest.raises(ZeroDivisionError):
         prepare.prepare("push", "a.mp4")
     assert len(closed) == 3
+
+
+@pytest.mark.parametrize(
+    ("cuts", "said"),
+    [((), []), ((3,), ["The clip jumps once, at 0.3 s: only one piece of it counts."])],
+)
+def test_a_clip_that_is_not_usable_and_jumps_is_told_where(cuts, said, monkeypatch):
+    monkeypatch.setattr(prepare, "read_clip", lambda path, **more: clip())
+    monkeypatch.setattr(prepare, "is_own", lambda *what: False)
+
+    def unusable(result, choices):
+        way, none = np.zeros((6, 2)), np.zeros(6)
+        result.tracks = Tracks(np.arange(6) / 10, way, way, none, none, 90, cuts)
+        raise Unusable("no arm is seen", "film one")
+
+    monkeypatch.setattr(prepare, "follow", unusable)
+    result = prepare.prepare("push", "a.mp4")
+    assert result.warnings == said and result.verdict.startswith("not usable: no arm is seen")

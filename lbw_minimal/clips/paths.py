@@ -147,14 +147,19 @@ def longest_piece(tracks: Tracks, touched: bool, warnings: list[str]) -> Tracks:
         )
     best = max(pieces, key=lambda piece: _extent(piece, "object" if touched else "tip"))
     if cuts:
-        *most, last = (f"{tracks.times[c]:.1f}" for c in cuts)
-        at = f"{', '.join(most)} and {last}" if most else last
-        often = {1: "once", 2: "twice"}.get(len(cuts), f"{len(cuts)} times")
-        warnings.append(
-            f"The clip jumps {often}, at {at} s: only the piece from {best.times[0]:.1f} to "
-            f"{best.times[-1]:.1f} s is used."
-        )
+        span = f"{best.times[0]:.1f} to {best.times[-1]:.1f} s"
+        warnings.append(f"{jumps(tracks)}: only the piece from {span} is used.")
     return best
+
+
+def jumps(tracks: Tracks) -> str:
+    """How often a clip jumps and when, without a full stop; "" if it does not."""
+    if not (cuts := _cuts(tracks)):
+        return ""
+    *most, last = (f"{tracks.times[c]:.1f}" for c in cuts)
+    at = f"{', '.join(most)} and {last}" if most else last
+    often = {1: "once", 2: "twice"}.get(len(cuts), f"{len(cuts)} times")
+    return f"The clip jumps {often}, at {at} s"
 
 
 def unsure(tracks: Tracks, name: str, first: float, last: float) -> list[str]:

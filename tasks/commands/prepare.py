@@ -25,7 +25,7 @@ from lbw_minimal.clips.detector import Detector, Found, refine
 from lbw_minimal.clips.motion import small
 from lbw_minimal.clips.page import clip_column, write_page
 from lbw_minimal.clips.patches import mended
-from lbw_minimal.clips.paths import Tracks, Unusable
+from lbw_minimal.clips.paths import Tracks, Unusable, jumps
 from lbw_minimal.clips.reader import Clip, read_clip
 from lbw_minimal.clips.retarget import FPS, Motion, Scene, lay
 from lbw_minimal.clips.stills import write_stills
@@ -176,6 +176,8 @@ def prepare(name: str, path: Path, choices: Choices | None = None) -> Prepared:
             result.done = reenact(env, result.motion)
         except Unusable as error:
             result.why_not = str(error)
+            if not result.motion and result.tracks and (said := jumps(result.tracks)):
+                result.warnings.append(f"{said}: only one piece of it counts.")
     finally:
         env.close()
     if result.motion:
