@@ -51,6 +51,11 @@ from tasks.world import random_actions
 def wander(rng):
     return random_actions(rng)
 """,
+    4: """
+def doubt(human, there, back):
+    again = back(there(human)).astype(float)
+    return np.abs(again - human).mean((1, 2, 3))
+""",
     5: """
 def hold(maps):
     return transporter.soft_argmax(torch.from_numpy(maps)[None])[0].numpy()
