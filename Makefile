@@ -21,7 +21,7 @@ install: $(VENV)/ready
 	@echo "Installed. Now type:  . $(BIN)/activate"
 
 test: $(VENV)/ready
-	@echo "The tests take 6 to 13 minutes on two cores."
+	@echo "The tests take 5 to 10 minutes on two cores."
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
