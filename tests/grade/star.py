@@ -10,6 +10,8 @@ import importlib
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
 
 @dataclass(frozen=True)
 class Star:
@@ -34,6 +36,14 @@ class Star:
         said = "it shines" if self.shines(reached) else f"not yet: it shines from {self.bar:g}"
         others = f"A first thought reaches {self.naive:g}, the kit's solution {self.ours:g}."
         return f"Star {number}: {reached:.3g} {self.unit}; {said}. {others}"
+
+
+def shaped(got, like: np.ndarray, what: str) -> np.ndarray:
+    """What an answer returned, as floats. Raises ValueError if its shape is not that of `like`."""
+    got = np.asarray(got, float)
+    if got.shape != like.shape:
+        raise ValueError(f"{what} has shape {got.shape}; it should be {like.shape}")
+    return got
 
 
 def find(number: int) -> Star:

@@ -14,7 +14,7 @@ from lbw_minimal.imitate import load_perception
 from lbw_minimal.munit_networks import MUNIT
 from tasks.world import TaskEnv, random_actions, record_expert
 from tasks.world.recording import film
-from tests.grade.star import Star
+from tests.grade.star import Star, shaped
 
 JITTER = 0.03  # m, of the starts
 RANDOM = 40  # frames of random motion after each expert
@@ -28,9 +28,7 @@ def wrong(doubt) -> float:
     one that is further from the true robot frame more."""
     shares = []
     for human, there, back, error in films():
-        said = np.asarray(doubt(human.copy(), there, back), float)
-        if said.shape != error.shape:
-            raise ValueError(f"the doubts have shape {said.shape}; there are {len(error)} frames")
+        said = shaped(doubt(human.copy(), there, back), error, "the row of doubts")
         i, j = np.triu_indices(len(error), 1)
         shares.append(1 - ((said[i] - said[j]) * (error[i] - error[j]) > 0).mean())
     return 100 * float(np.mean(shares))

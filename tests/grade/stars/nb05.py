@@ -9,7 +9,7 @@ import tasks
 from lbw_minimal import transporter
 from lbw_minimal.images import to_images
 from tasks.world import record_expert
-from tests.grade.star import Star
+from tests.grade.star import Star, shaped
 
 FOLLOWS = {"push": 2, "slide": 1, "coffee": 1, "drawer": 1}  # the keypoint that is the object's
 PASSERS = 6  # films of each task, with another passer-by in each
@@ -21,9 +21,7 @@ def error(read) -> float:
     """Mean distance in pixels of read(maps), (T, 2), from where the keypoint belongs."""
     off = []
     for maps, belongs in films():
-        z = np.asarray(read(maps.copy()), float)
-        if z.shape != belongs.shape:
-            raise ValueError(f"the path has shape {z.shape}; there are {len(belongs)} maps")
+        z = shaped(read(maps.copy()), belongs, "the path")
         off.append(42 * np.linalg.norm(z - belongs, axis=-1).mean())
     return float(np.mean(off))
 

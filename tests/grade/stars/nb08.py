@@ -6,7 +6,7 @@ import numpy as np
 
 import tasks
 from tasks.world import record_expert
-from tests.grade.star import Star
+from tests.grade.star import Star, shaped
 
 # Of the lamp, one a film: its own, and one like the arm's, the tiles' and the mug's.
 COLOURS = (0.8, 0.7, 0.35), (0.75, 0.53, 0.42), (0.6, 0.55, 0.48), (0.78, 0.12, 0.1)
@@ -17,9 +17,7 @@ def left(put_out) -> float:
     """How far put_out(film) is from the film without a lamp, as a share of how far the film is."""
     shares = []
     for lit, dark in films():
-        done = np.asarray(put_out(lit.copy()), float)
-        if done.shape != lit.shape:
-            raise ValueError(f"the film has shape {done.shape}; it should be {lit.shape}")
+        done = shaped(put_out(lit.copy()), lit, "the film")
         shares.append(np.abs(done - dark).sum() / np.abs(lit.astype(float) - dark).sum())
     return float(np.mean(shares))
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tests.grade.star import Star
+from tests.grade.star import Star, shaped
 
 CLIPS, SIZE = 20, 84.0  # and pixels of a picture
 NOISE, WRONG = 1.0, 0.06  # pixels; share of the frames in which a burst of wrong finds begins
@@ -13,9 +13,7 @@ def error(mend) -> float:
     off = []
     for seed in range(CLIPS):
         times, truth, found = clip(np.random.default_rng(seed))
-        path = np.asarray(mend(times.copy(), found.copy()), float)
-        if path.shape != truth.shape:
-            raise ValueError(f"the path has shape {path.shape}; there are {truth.shape} places")
+        path = shaped(mend(times.copy(), found.copy()), truth, "the path")
         off.append(np.linalg.norm(path - truth, axis=1).mean())
     return float(np.mean(off))
 

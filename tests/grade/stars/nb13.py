@@ -4,7 +4,7 @@ import numpy as np
 
 import tasks
 from lbw_minimal import tracks, video
-from tests.grade.star import Star
+from tests.grade.star import Star, shaped
 
 CURTAIN = 6  # frames in which nothing is seen
 NOISE, LIGHT = 4.0, 0.05  # grey levels; share by which the light flickers
@@ -15,9 +15,7 @@ def error(locate) -> float:
     off = []
     for task in tasks.TASKS[1:]:  # reach has no object
         frames, points, d_E, seen = hidden(task)
-        d = np.asarray(locate(frames.copy(), points.copy()), float)
-        if d.shape != d_E.shape:
-            raise ValueError(f"the track has shape {d.shape}; there are {len(d_E)} frames")
+        d = shaped(locate(frames.copy(), points.copy()), d_E, "the track")
         off.append(np.linalg.norm(d - d_E, axis=1)[seen].mean())
     return float(np.mean(off))
 
