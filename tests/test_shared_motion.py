@@ -43,7 +43,8 @@ def test_a_cell_votes_for_what_it_is_more_like():
     before, after = panned([0, 8])
     after[:, W // 2 :] = before[:, W // 2 :]
     there = np.array([[1.0, 0, -8], [0, 1, 0], [0, 0, 1]])
-    said = camera._Picture(before, camera.FINE).votes(after, there)
+    picture = camera._Picture(before, camera.FINE)
+    said = picture.votes(camera._plain(after, picture.size), there)
     assert said.shape == (6, 12)
     assert (said[:, 1:5] > 0).mean() > 0.9 and (said[:, 7:] < 0).mean() > 0.9
 
@@ -78,7 +79,8 @@ def test_a_picture_is_laid_over_one_that_is_turned_and_nearer():
     (frame,) = panned([40])
     there = np.vstack([cv2.getRotationMatrix2D((W / 2, H / 2), 3, 1.08), (0, 0, 1)])
     other = cv2.warpAffine(frame, there[:2], (W, H), flags=cv2.INTER_CUBIC)
-    found = camera._Picture(frame, camera.FINE).laid(other, np.eye(3))
+    picture = camera._Picture(frame, camera.FINE)
+    found = picture.laid(camera._plain(other, picture.size), np.eye(3))
     corners = np.array([(0, 0, 1), (W, 0, 1), (0, H, 1), (W, H, 1)], float)
     assert np.abs(((found - there) @ corners.T)[:2]).max() < 0.3
 

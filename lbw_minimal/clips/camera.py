@@ -36,9 +36,10 @@ def sway(frames: np.ndarray) -> np.ndarray:
     coarse, fine = (_Picture(frames[0], side) for side in (COARSE, FINE))
     there, at, votes = np.eye(3), [], []
     for t in every:
-        there = fine.laid(frames[t], coarse.laid(frames[t], there))
+        plain = _plain(frames[t], fine.size)
+        there = fine.laid(plain, coarse.laid(_plain(frames[t], coarse.size), there))
         at.append(np.linalg.inv(there)[:2].ravel())
-        votes.append(fine.votes(frames[t], there))
+        votes.append(fine.votes(plain, there))
     if _stands(np.array(votes)):
         return np.repeat(np.eye(3)[None, :2], len(frames), axis=0)
     along = np.arange(len(frames))
@@ -66,7 +67,8 @@ def steadied(frames: np.ndarray, sways: np.ndarray) -> np.ndarray:
 
 
 class _Picture:
-    """A first frame, over which others are laid. Its places count from the picture's middle."""
+    """A first frame, over which others are laid, `_plain` and as large. Its places count from the
+    picture's middle."""
 
     def __init__(self, frame: np.ndarray, side: int):
         h, w = frame.shape[:2]
@@ -87,12 +89,11 @@ class _Picture:
         self.middle = middle, np.linalg.inv(middle)
         self.scale = np.diag([self.size[0] / w, self.size[1] / h, 1.0])
 
-    def laid(self, frame: np.ndarray, there: np.ndarray) -> np.ndarray:
+    def laid(self, plain: np.ndarray, there: np.ndarray) -> np.ndarray:
         """The similarity (3, 3) from this picture's pixels, at full size, to those of a frame.
 
         there: where to begin.
         """
-        plain = _plain(frame, self.size)
         at = self.scale @ there @ np.linalg.inv(self.scale)
         for _ in range(STEPS):
             off, inside = self._off(plain, at)
@@ -108,10 +109,9 @@ class _Picture:
                 break
         return np.linalg.inv(self.scale) @ at @ self.scale
 
-    def votes(self, frame: np.ndarray, there: np.ndarray) -> np.ndarray:
+    def votes(self, plain: np.ndarray, there: np.ndarray) -> np.ndarray:
         """For each cell (h, w) of this picture: 1 if it is more like the frame moved by `there`,
         -1 if it is more like the frame as it stands, 0 if it does not tell."""
-        plain = _plain(frame, self.size)
         at = self.scale @ there @ np.linalg.inv(self.scale)
         moves, stands = (self._off(plain, one) for one in (at, np.eye(3)))
         noise, cell = _noise(*moves), max(self.size) / CELLS

@@ -28,9 +28,9 @@ CORNERS = 3  # fewer give no median
 def _found_again(one, two, corners):
     """Where the corners (n, 1, 2), n >= 1, of a grey frame are in another, and which (n,) bool come
     back when they are followed backwards."""
-    how: dict[str, Any] = {"winSize": WINDOW, "flags": cv2.OPTFLOW_USE_INITIAL_FLOW}
-    there, ok, _ = cv2.calcOpticalFlowPyrLK(one, two, corners, corners.copy(), **how)
-    back, ok_back, _ = cv2.calcOpticalFlowPyrLK(two, one, there, there.copy(), **how)
+    how: dict[str, Any] = {"nextPts": None, "winSize": WINDOW}
+    there, ok, _ = cv2.calcOpticalFlowPyrLK(one, two, corners, **how)
+    back, ok_back, _ = cv2.calcOpticalFlowPyrLK(two, one, there, **how)
     kept = (np.hstack([ok, ok_back]) > 0).all(1)
     return there, kept & (np.linalg.norm(back - corners, axis=2)[:, 0] < BACK)
 
