@@ -183,6 +183,7 @@ def graded(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         printed = []
         patch.setattr(grading, "say", lambda text, where=None: printed.append(printable(str(text))))
+        patch.setattr(grading, "Sandbox", sandbox.Sandbox)  # not one whose worker waits already
         starts, command = [], sandbox.command
         patch.setattr(sandbox, "command", lambda fd: starts.append(fd) or command(fd))
         patch.setattr(sandbox, "LEAVING", 60)  # s: a machine with too much to do starts none anew
