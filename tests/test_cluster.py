@@ -6,6 +6,7 @@ What needs Ray is skipped where requirements-cluster.txt is not installed.
 import json
 import os
 import signal
+import subprocess
 import sys
 import threading
 import time
@@ -14,9 +15,10 @@ from pathlib import Path
 import pytest
 
 import tests.grade.cluster
+from lbw_minimal import cluster
 from lbw_minimal.training import InputError
 from tasks.__main__ import main
-from tasks.commands import batch, cluster, table
+from tasks.commands import batch, table
 from tests.grade import sandbox
 from tests.grade.__main__ import main as grade
 from tests.grade.cluster import grade_here
@@ -152,6 +154,24 @@ def test_a_line_of_print_is_a_command_of_the_kit(tmp_path, capsys):
 # What Ray's processes load
 
 
+def test_what_starts_ray_and_what_a_cluster_calls_to_run_a_command_does_without_torch():
+    code = "import sys, lbw_minimal.cluster, tests.grade; sys.exit('torch' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], cwd=ROOT).returncode == 0
+
+
+def test_ray_starts_while_the_rest_is_done_and_may_fail_until_it_is_needed(monkeypatch):
+    begun, started = threading.Event(), []
+
+    def connect(kit):
+        started.append((kit, begun.wait(30), threading.current_thread()))
+        raise InputError("--ray: no")
+
+    monkeypatch.setattr(cluster, "connect", connect)
+    monkeypatch.setattr(cluster, "_ray", lambda: None)
+    cluster.ahead(cluster.CODE, begun.set)
+    assert started == [(cluster.CODE, True, threading.main_thread())]
+
+
 @pytest.fixture
 def look():
     """For a node: where the kit is, whence the library is taken that slows Ray's processes down,
@@ -161,7 +181,7 @@ def look():
         import importlib.util
         import sys
 
-        from tasks.commands import cluster
+        from lbw_minimal import cluster
 
         library = importlib.util.find_spec("rfc3987_syntax")
         return cluster.ROOT, Path(library.origin), "lark" in sys.modules
@@ -279,7 +299,7 @@ def test_what_a_node_refuses_another_does_and_it_is_said(nodes, capsys):
 
         import ray
 
-        from tasks.commands.cluster import Refused
+        from lbw_minimal.cluster import Refused
 
         time.sleep(0.2)
         if ray.get_runtime_context().get_node_id() in bad:

@@ -14,9 +14,10 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
+from lbw_minimal import cluster
 from lbw_minimal.reward import MENDS
 from lbw_minimal.training import InputError, write_atomic
-from tasks.commands import cluster, make_folder
+from tasks.commands import make_folder
 
 # Arguments of a run by its change; "" is the recipe. These train all of their networks ...
 ALONE = {

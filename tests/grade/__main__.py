@@ -22,7 +22,13 @@ import time
 import traceback
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict
+from importlib import import_module
 from pathlib import Path
+
+from lbw_minimal import cluster
+
+if __name__ == "__main__" and "--ray" in sys.argv:  # what is imported below takes a second or two
+    cluster.ahead(cluster.CODE, lambda: import_module("tests.grade.exercise").everything())
 
 from lbw_minimal.training import InputError, write_atomic
 from tests.grade import feedback, sandbox
@@ -78,9 +84,7 @@ def main(argv=None) -> int:
         return 130
     with ThreadPoolExecutor(1) as aside:  # to end Ray takes as long as to write the reports
         if args.ray:
-            from tasks.commands.cluster import leave  # Gradescope's archive has no tasks
-
-            aside.submit(leave)
+            aside.submit(cluster.leave)
         written = _written(args.out, entries, grades, ids)
     return 0 if written and not any("failed" in g for g in grades) else 1
 
@@ -426,7 +430,7 @@ def on_cluster(job, entries: list[Submission], ids: list[str], args) -> list[dic
 
     Raises InputError without Ray, or where no node's sandbox holds.
     """
-    from tests.grade import cluster  # slow, and seldom needed
+    from tests.grade.cluster import spread
 
     grades, there = {}, []
     for entry in entries:
@@ -438,7 +442,7 @@ def on_cluster(job, entries: list[Submission], ids: list[str], args) -> list[dic
                 there.append((entry, (files, notes, digest, *how)))
                 continue
         grades[entry] = job(entry)
-    for entry, graded in cluster.spread(there):
+    for entry, graded in spread(there):
         grades[entry] = job(entry, graded)
     return [grades[entry] for entry in entries]
 

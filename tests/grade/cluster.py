@@ -1,4 +1,4 @@
-"""Grading on many machines, by `tasks/commands/cluster.py`: notebooks go out, results return."""
+"""Grading on many machines, by `lbw_minimal/cluster.py`: notebooks go out, results return."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import functools
 from collections.abc import Iterator
 from pathlib import Path
 
-from tasks.commands import cluster
+from lbw_minimal import cluster
 from tests.grade import sandbox
 from tests.grade.files import File
 from tests.grade.judge import Result, settle

@@ -3,7 +3,7 @@
 A job is a call of a function with plain values. What it returns comes back through Ray, files as
 bytes: the machines need no common folder. A local cluster reads the kit's files where they are, to
 another they travel; each node needs Python with requirements.txt and requirements-cluster.txt
-installed.
+installed. Nothing here needs torch, which takes a process a second to import.
 """
 
 from __future__ import annotations
@@ -13,13 +13,12 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from lbw_minimal.training import InputError
-
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[1]
 CODE = ("lbw_minimal", "notebooks", "tasks", "tests")  # of the kit, with the videos: 7 MB
 KIT = (*CODE, "solutions")  # with the weights: 30 MB
 LEAN = Path(__file__).with_name("lean")  # for the path of Ray's processes: see what lies there
@@ -42,15 +41,7 @@ def connect(kit: tuple[str, ...] = KIT) -> Any:
     kit: what of the kit goes to a cluster that runs. Raises InputError without Ray, and where it
     does not start, as on a machine with far too much to do.
     """
-    sys.path.insert(0, str(LEAN))
-    try:
-        import ray
-    except ImportError:
-        raise InputError(
-            "--ray: Ray is not installed; pip install -r requirements-cluster.txt does it."
-        ) from None
-    finally:
-        sys.path.remove(str(LEAN))
+    ray = _ray()
     if not ray.is_initialized():
         os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
         os.environ.setdefault("RAY_OVERRIDE_RUNTIME_ENV_DEFAULT_EXCLUDES", "")  # ours say it all
@@ -64,8 +55,39 @@ def connect(kit: tuple[str, ...] = KIT) -> Any:
                 try:
                     ray.init(address="local", include_dashboard=False, logging_level="warning")
                 except Exception as e:  # Ray raises no narrower one
-                    raise InputError(f"--ray: Ray does not start here: {e}") from e
+                    raise _error(f"Ray does not start here: {e}") from e
     return ray
+
+
+def ahead(kit: tuple[str, ...], rest: Callable[[], Any]) -> None:
+    """Connect, and do the `rest` meanwhile: Ray starts in the main thread alone, and mostly waits.
+
+    What fails is left for the next `connect` to say, and for who needs the rest.
+    """
+    with contextlib.suppress(Exception), ThreadPoolExecutor(1) as aside:
+        _ray()
+        aside.submit(rest)
+        connect(kit)
+
+
+def _ray() -> Any:
+    """Ray's module. Raises InputError where there is none."""
+    sys.path.insert(0, str(LEAN))
+    try:
+        import ray
+    except ImportError:
+        why = "Ray is not installed; pip install -r requirements-cluster.txt does it."
+        raise _error(why) from None
+    finally:
+        sys.path.remove(str(LEAN))
+    return ray
+
+
+def _error(why: str) -> Exception:
+    """An InputError; its module imports torch."""
+    from lbw_minimal.training import InputError
+
+    return InputError(f"--ray: {why}")
 
 
 @contextlib.contextmanager
@@ -121,7 +143,7 @@ def spread(
         refused[node] = why
         able = (n["NodeID"] for n in ray.nodes() if n["Alive"] and n["Resources"].get("CPU"))
         if refused.keys() >= set(able):
-            raise InputError(f"--ray: no node takes these jobs. {'. '.join(refused.values())}")
+            raise _error(f"no node takes these jobs. {'. '.join(refused.values())}")
         waiting[start(*job)] = (name, *job)
 
 
