@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from toy_clips import shows
 
-from lbw_minimal import video
+from lbw_minimal import tracks, video
 from lbw_minimal.clips.detector import Found
 from lbw_minimal.clips.footage import Footage
 from lbw_minimal.clips.page import write_page
@@ -158,6 +158,14 @@ def test_learning_from_a_clip_keeps_the_shipped_eyes_and_the_page(tmp_path):
     assert job.trained is not None and not job.from_scratch
     np.testing.assert_array_equal(job.demo[0], video.read(tmp_path / "reenactment.mp4")[0][0])
     assert "Push: usable" in (tmp_path / "prepare.html").read_text()
+
+
+def test_object_tracks_watch_the_reenactment_and_not_the_clip(filmed, eyes, tmp_path):
+    """The clip's cube goes to the left, for it was filmed from the other side."""
+    arguments = ["--method", "tracks", "--video", str(filmed[0]), "--out", str(tmp_path)]
+    job = check("push", parser("push").read(arguments), arguments)
+    clip, _ = video.read(filmed[0])
+    assert tracks.watch(clip).path[-1][0] < -15 and tracks.watch(job.demo).path[-1][0] > 15
 
 
 def test_the_papers_way_translates_the_clip_itself(tmp_path):
