@@ -83,6 +83,10 @@ RIGHT = {
         "axes[0].plot([0, 1])\nplt.show()\nroot = np.sqrt", "root",
     ),
     "beside a line that fails": ("import tasks\ntasks.play()\nroot = np.sqrt", "root"),
+    "behind an await at the top": (
+        "import asyncio\nroot = np.sqrt\nawait asyncio.sleep(0)\none = await asyncio.sleep(0, 1)",
+        "one * root",
+    ),
     "beside one that trains": (
         "root = np.sqrt\nfor i in range(10**12):\n    x = i * i", "root",
     ),
@@ -179,6 +183,14 @@ FORMS = {
     "3.4 matrix": ALL["3.4"].source.replace("return ", "return np.asmatrix(") + ").A1",
     "0.1 fraction": "from fractions import Fraction\ndef success_rate(distances, threshold):\n"
     "    return Fraction(int((distances < threshold).sum()), len(distances))",
+    "0.1 list of one": ALL["0.1"].source.replace("return ", "return [") + "]",
+    "0.1 longdouble": ALL["0.1"].source.replace("return ", "return np.longdouble(") + ")",
+    "0.1 own kind of float": "class Rate(float):\n    pass\n"
+    + ALL["0.1"].source.replace("return ", "return Rate(") + ")",
+    "0.1 complex": ALL["0.1"].source.replace("return ", "return complex(") + ")",
+    "3.4 longdoubles": ALL["3.4"].source.replace("return ", "return np.longdouble(") + ")",
+    "3.4 array of the standard library": "from array import array\n"
+    + ALL["3.4"].source.replace("return ", "return array('d', ") + ")",
     "9.4 float": ALL["9.4"].source.replace("return sum", "return 1.0 * sum"),
     "9.4 numpy": ALL["9.4"].source.replace("return sum", "return np.int32(sum") + ")",
     "8.2 nested lists": ALL["8.2"].source.replace("return ", "return (") + ").tolist()",

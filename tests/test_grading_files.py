@@ -351,6 +351,9 @@ def test_a_folder_is_one_submission_or_a_class(tmp_path, names, one):
         ("06_reward_final_final.ipynb", "06_reward"),
         ("06_reward-10.ipynb", "06_reward"),
         ("06_reward_v2.ipynb.txt", "06_reward"),
+        ("Copy of 06_reward.ipynb", "06_reward"),
+        ("Kopie von Copy of 06_Reward (1).ipynb", "06_reward"),
+        ("Copies of 06_reward.ipynb", ""),
         ("06_reward_miller.ipynb", ""),
         ("06_reward_1234567.ipynb", ""),  # a student's number
         ("06_rewards.ipynb", ""),
@@ -359,6 +362,11 @@ def test_a_folder_is_one_submission_or_a_class(tmp_path, names, one):
 )
 def test_a_later_version_is_known_by_its_name(name, stem):
     assert released(name) == stem
+
+
+def test_a_copy_is_later_than_what_it_was_copied_from():
+    old, new = File("06_reward.ipynb", changed=2.0), File("Copy of 06_reward.ipynb", changed=1.0)
+    assert in_order([new, old]) == [old, new]
 
 
 def test_of_versions_without_a_date_the_one_written_last_counts():
@@ -391,13 +399,15 @@ def test_a_submission_of_many_files_has_an_end(tmp_path, monkeypatch):
         ("%timeit f(\nx = 1", "pass\nx = 1"),
         ("files = !ls\nx = 1", "files = None\nx = 1"),
         ("x = 1\nx?\n?x\nx.y??", "x = 1\npass\npass\npass"),
-        ("if 1:\n    %time x\ny = (1\n    % 2)", "if 1:\n    pass\ny = (1\n    % 2)"),
+        ("if 1:\n    %time x\ny = (1\n    % 2)", "if 1:\n    x\ny = (1\n    % 2)"),
         ('!ls\nx = """\n!ls\nwhy?\n"""\n!ls', 'pass\nx = """\n!ls\nwhy?\n"""\npass'),
         ("!ls \\\n  -l\nx = 1", "pass\nx = 1"),
         ("%%time\nx = 1", "x = 1"),
         (">>> x = 1\n>>> y = 2", "x = 1\ny = 2"),
         ("    x = 1\n    !ls", "x = 1\npass"),
         ("!echo it's (\nx = ')'\n!ls", "pass\nx = ')'\npass"),
+        ("%time x = f(1)\n    %time f(2)\ny = %time f(3)", "x = f(1)\n    f(2)\ny = f(3)"),
+        ("%time !ls\n%timeit x = 1\n%time", "pass\npass\npass"),
     ],
 )
 def test_ipythons_lines_are_left_out(source, python):

@@ -298,7 +298,7 @@ def _array(items):
 
 
 def _different_numbers(got, want, check):
-    if isinstance(got, list | tuple) and np.ndim(want):
+    if isinstance(got, list | tuple) and (np.ndim(want) or len(got) == 1):
         got = _array(got)
     if not (isinstance(got, np.ndarray) or _is_number(got) or isinstance(got, bool)):
         return f"it returns {_kind(got)}; expected {_kind(want)}"
@@ -320,7 +320,7 @@ def _different_numbers(got, want, check):
         return None
     # Where it is furthest off; of what is barely off, one would believe that it is rounding.
     with np.errstate(invalid="ignore"):  # infinity less infinity
-        off = np.where(close, 0, np.nan_to_num(np.abs(got - want.astype(float)), nan=np.inf))
+        off = np.where(close, 0, np.nan_to_num(np.abs(got - 1.0 * want), nan=np.inf))
     at = np.unravel_index(np.argmax(off), close.shape) if close.ndim else ()
     where = f" at {tuple(int(i) for i in at)}" if at else ""
     return f"it gives {_short(got[at])}{where}; expected {_short(want[at])}"

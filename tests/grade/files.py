@@ -24,7 +24,8 @@ RELEASED = Path(__file__).resolve().parents[2] / "notebooks"
 NOTEBOOK = re.compile(r"\.ipynb(\.(txt|json))?$", re.IGNORECASE)  # some browsers add an ending
 LIBRARIES = {"site-packages", "node_modules", "__pycache__", "__MACOSX"}
 KIT = {"lbw_minimal", "notebooks"}  # the folders by which the kit is known
-# What people and programs add to the name of a later version.
+# What people and programs add to the name of a later version, before it (Colab) and behind it.
+COPY = r"(?:(?:copy of|kopie von|copie de|copia de)[\s_]+)*"
 LATER = r"(?:[\s_.()-]|v?\d{1,3}(?!\d)|copy|kopie|final|last|new|neu|corrected|fixed|resubmission)*"
 UNPRINTABLE = re.compile(
     "[\x00-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]"
@@ -133,7 +134,7 @@ def _read(path: Path, name: str, room: int) -> File:
 def released(name: str) -> str:
     """The name in the course ("06_reward") of a notebook or a later version of it, "" if none."""
     stem = NOTEBOOK.sub("", name.rpartition("/")[2])
-    match = re.match(rf"({'|'.join(_released())}){LATER}$", stem, re.IGNORECASE)
+    match = re.match(rf"{COPY}({'|'.join(_released())}){LATER}$", stem, re.IGNORECASE)
     return match[1].lower() if match else ""
 
 
@@ -145,9 +146,10 @@ def _released() -> list[str]:
 def version(name: str) -> tuple[bool, int]:
     """How late a version a name says it is, to be compared: "06_reward (2)" is later than
     "06_reward", and "06_reward_final" later than both."""
-    rest = NOTEBOOK.sub("", name.rpartition("/")[2])[len(released(name)) :]
-    numbers = re.findall(r"\d+", rest) if released(name) else []
-    return bool(re.search("final|last", rest, re.IGNORECASE)), int(numbers[-1]) if numbers else 0
+    stem, rest = released(name), NOTEBOOK.sub("", name.rpartition("/")[2])
+    copy, _, rest = rest.lower().partition(stem) if stem else ("", "", rest.lower())
+    numbers = re.findall(r"\d+", rest) if stem else []
+    return bool(re.search("final|last", rest)), int(numbers[-1]) if numbers else int(bool(copy))
 
 
 def executed(file: File) -> str:

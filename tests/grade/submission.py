@@ -19,10 +19,10 @@ CELLS = 1_000  # of code; the course's have 30
 LENGTH = 200_000  # characters of a cell
 SOURCES = 1_000_000  # characters of all cells; the course's have 20,000
 CONFLICT = re.compile(r"^<{7} ", re.MULTILINE)
-# A line for IPython: %magic, !shell, names = %magic, ?name, name?
+# A line for IPython: %magic, !shell, names = %magic, ?name, name?. What %time times is Python.
 MAGIC = re.compile(
     r"(?P<indent>\s*)(?:(?P<names>[A-Za-z_][\w., ]*)=\s*)?"
-    r"(?:[%!]|\?{1,2}[\w.%]|%?[\w.*]+\?{1,2}\s*$)"
+    r"(?:%time[ \t]+(?P<timed>.+)|[%!]|\?{1,2}[\w.%]|%?[\w.*]+\?{1,2}\s*$)"
 )
 PIECE = re.compile(r"\"\"\"|'''|\"(?:\\.|[^\"\\\n])*\"?|'(?:\\.|[^'\\\n])*'?|#.*|[\[({]|[\])}]")
 ENDS = {quotes: re.compile(rf"(?:\\.|[^\\])*?{quotes}", re.DOTALL) for quotes in ('"""', "'''")}
@@ -178,11 +178,9 @@ def _without_magic(lines: list[str]) -> str:
             quotes, depth = _inside(line, quotes, depth)
             done.append(line)
         elif not goes_on:
-            done.append(
-                f"{magic['indent']}{magic['names']}= None\n"
-                if magic["names"]
-                else f"{magic['indent']}pass\n"
-            )
+            timed = magic["timed"] if magic["timed"] and _parse(magic["timed"]) else ""
+            value = f"{magic['names']}= {timed or None}" if magic["names"] else timed or "pass"
+            done.append(f"{magic['indent']}{value}\n")
         goes_on = line.rstrip("\r\n").endswith("\\")
     return "".join(done)
 

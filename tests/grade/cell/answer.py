@@ -150,8 +150,8 @@ class Statement:
     @functools.cached_property
     def code(self) -> CodeType:
         """Raises SyntaxError for what parses and means nothing, such as a lone return."""
-        tree = ast.Module([self.node], [])
-        return compile(tree, self.label, "exec", self.flags, dont_inherit=True)
+        tree, flags = ast.Module([self.node], []), self.flags | ast.PyCF_ALLOW_TOP_LEVEL_AWAIT
+        return compile(tree, self.label, "exec", flags, dont_inherit=True)
 
 
 @functools.lru_cache(maxsize=1000)
@@ -217,7 +217,7 @@ class Cells:
             if seconds <= 0 and not statement.quiet:
                 raise TooLong
             with within(max(seconds, 0.2)):
-                exec(code, self.names)
+                execute(code, self.names)
         except TooLong:
             why = TimeoutError(f"it ran for more than {CELL:g} s, and was left out")
             self._lost(statement.node, why)
@@ -241,6 +241,14 @@ class Cells:
         for source, definitions_only in cells:
             with contextlib.suppress(SyntaxError, ValueError, RecursionError, MemoryError):
                 self.run(source, definitions_only)
+
+
+def execute(code: CodeType, names: dict) -> None:
+    """Run a statement; one that awaits something, which Jupyter allows at the top, to its end."""
+    awaits = eval(code, names)
+    with contextlib.suppress(StopIteration):
+        while awaits:
+            awaits.send(None)
 
 
 @contextlib.contextmanager

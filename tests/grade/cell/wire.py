@@ -8,6 +8,7 @@ Nothing is unpickled: bytes from a hostile process become plain values or `Garba
 import json
 import math
 import struct
+from array import array
 from collections import deque
 from decimal import Decimal
 from fractions import Fraction
@@ -23,6 +24,7 @@ DTYPES = {
     for kind, sizes in {"f": (2, 4, 8), "i": (1, 2, 4, 8), "u": (1, 2, 4, 8)}.items()
     for size in sizes
 } | {"b1", "c8", "c16"}
+LONG = {"g": "f8", "G": "c16"}  # of as many bits as a processor likes
 RAISED = {"raised": 100, "text": 1000, "line": 200}  # characters of each
 KEYS = (str, int, bool, type(None))  # of a dict; numbers of other kinds can share one hash
 
@@ -72,7 +74,7 @@ def encode(value) -> bytes:
             return {"v": str.__str__(x)}  # of np.str_ and the like, too
         if kind is int or (isinstance(x, int) and not isinstance(x, np.generic)):
             return {"int": str(int(x))} if abs(x) < LARGEST else {"other": "a huge int"}
-        if isinstance(x, Fraction | Decimal):
+        if isinstance(x, Fraction | Decimal | float) and not isinstance(x, np.generic):
             x, kind = float(x), float
         if kind is float:
             return {"float": x.hex() if math.isfinite(x) else repr(x)}
@@ -91,12 +93,16 @@ def encode(value) -> bytes:
             if x.device.type != "cpu":
                 return {"other": f"a tensor on {x.device}"}
             x = x.detach().resolve_conj().resolve_neg().numpy()
-        if isinstance(x, np.generic):
+        if isinstance(x, np.generic | complex):
             x, tensor = np.asarray(x), "scalar"
+        if isinstance(x, array):
+            x = np.asarray(x)
         if hasattr(x, "__array__") and type(x) is not np.ndarray and not isinstance(x, type):
             x = np.asarray(x)  # another library's array
         if type(x) is np.ndarray and x.dtype == object:
             x = as_numbers(x)
+        if type(x) is np.ndarray and x.dtype.char in LONG:
+            x = x.astype(LONG[x.dtype.char])
         if type(x) is np.ndarray and x.dtype.str[1:] in DTYPES:
             # A fresh contiguous copy, so that views and odd strides pass.
             x = np.array(x, order="C", dtype=x.dtype.newbyteorder("="))

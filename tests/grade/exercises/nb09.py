@@ -82,7 +82,19 @@ make_drawer.check(
 make_drawer.check(
     "a push above it does, and nothing else brakes", lambda rng: _push(rng, 0.8, 2, 0.36), atol=2e-4
 )
-make_drawer.check("it stops where it is shut", lambda rng: _push(rng, 15, 25, 1.0), atol=5e-3)
+
+
+def _pull(rng):
+    force, *others = _push(rng, 15, 25, 1.0)
+    return -force, *others
+
+
+make_drawer.check(
+    "it stops where it is shut, and where it is open",
+    lambda rng: _push(rng, 15, 25, 1.0),
+    atol=5e-3,
+    least=_pull,
+)
 make_drawer.mistake(
     "The motor has no force of yours, and Bullet's is too strong for any push: force=friction.",
     ", force=friction",
@@ -127,6 +139,11 @@ make_drawer.mistake(
     "jointLowerLimit=-9",
     "jointUpperLimit=0",
     "jointUpperLimit=9",
+)
+make_drawer.mistake(
+    "It can be pulled out of its cabinet: the joint's lower limit is -0.15.",
+    "jointLowerLimit=-0.15",
+    "jointLowerLimit=-9",
 )
 make_drawer.mistake(
     "Something else brakes it: Bullet damps links and joints by default; linearDamping=0 and "
