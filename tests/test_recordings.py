@@ -49,7 +49,7 @@ def shipped(name):
 
 @pytest.mark.skipif(
     sys.platform != "linux" or not {"AVX2", "X86_V3"} & set(KNOWN),  # NumPy has two names for it
-    reason="the films were made on Linux, on a processor with AVX2",
+    reason="needs Linux and a processor with AVX2, with which the films were made",
 )
 @pytest.mark.parametrize("every", [14, pytest.param(1, marks=pytest.mark.slow)])
 def test_with_the_same_kernels_the_experts_go_where_they_went_to_the_last_bit(every):
