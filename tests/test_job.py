@@ -11,7 +11,8 @@ import tasks
 from lbw_minimal.imitate import Recipe
 from lbw_minimal.training import InputError
 from tasks.commands import job
-from tasks.commands.job import METHODS, fields_of, prepare_folder, read_number, videos
+from tasks.commands.job import prepare_folder, videos
+from tasks.commands.recipe import METHODS, fields_of, read_number, recipe_of
 
 
 def test_a_new_run_clears_an_older_runs_results_and_nothing_else(tmp_path):
@@ -164,6 +165,26 @@ def test_a_job_notes_what_makes_the_run_again(tmp_path, monkeypatch):
     assert made.command.startswith("python -m tasks push --method tracks --seed 3")
     assert made.command.endswith("--threads 1") and f"'{tmp_path / 'a b'}'" in made.command
     assert made.random.shape == (0, 84, 84, 3) and made.trained is None and len(made.demo) == 1
+
+
+@pytest.mark.parametrize(
+    ("task", "given", "steps"),
+    [
+        ("push", ["--video", "my.mp4"], 6000),
+        ("coffee", ["--video", "my.mp4"], 10_000),
+        ("slide", ["--video", "my.mp4"], 20_000),
+        ("push", [], 3000),
+        ("push", ["--video", "my.mp4", "--fast"], 800),
+        ("push", ["--video", "my.mp4", "--translate-clip"], 3000),
+        ("push", ["--video", "my.mp4", "--method", "tracks"], 3000),
+        ("push", ["--video", "my.mp4", "--set", "policy_steps=50"], 50),
+    ],
+)
+def test_a_policy_that_follows_a_persons_clip_practises_twice_as_long(task, given, steps):
+    args = job.parser(task).read(given)
+    recipe = tasks.module(task).RECIPE
+    scratch = args.fast or args.translate_clip
+    assert recipe_of(recipe, args, scratch).policy_steps == steps
 
 
 def test_a_smoke_run_is_of_smoke_sizes_and_what_is_set_comes_before_them(tmp_path, monkeypatch):

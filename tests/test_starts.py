@@ -11,7 +11,7 @@ import pytest
 import tasks
 from lbw_minimal import imitate, video
 from tasks import world
-from tasks.commands.job import fields_of
+from tasks.commands.recipe import fields_of
 from tasks.world import DT, SUBSTEPS, random_actions
 from tasks.world import motion as module
 from tasks.world.env import LOW, TOUCH

@@ -13,7 +13,7 @@ from lbw_minimal.reward import MENDS
 from lbw_minimal.training import InputError
 from tasks import TASKS, WEIGHTS
 from tasks.commands import ablation, batch, table
-from tasks.commands.job import fields_of
+from tasks.commands.recipe import fields_of
 
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / "solutions" / "results"

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import argparse
-import dataclasses
 import hashlib
 import json
-import math
 import os
 import platform
 import shlex
@@ -26,6 +24,7 @@ from lbw_minimal.training import InputError, pick_device, write_atomic
 from tasks.commands import JITTER, Parser, at_least, make_folder, metres
 from tasks.commands.own_clip import bring, folder
 from tasks.commands.prepare import FILM, PAGE, STILLS, usable
+from tasks.commands.recipe import METHODS, PIXELS, fields_of, recipe_of
 from tasks.commands.record import EXPERTS
 
 TEST_EPISODES = 10  # as in the paper
@@ -40,26 +39,6 @@ RESULTS = (
     PAGE,
     STILLS,
 )
-FAST = {
-    "munit_iterations": 10,
-    "munit_width": 8,
-    "transporter_iterations": 20,
-    "policy_steps": 800,
-    "robot_frames": 200,
-    "classifier_iterations": 200,
-}
-FAST_PIXELS = {"policy_steps": 530}  # few updates, each of which takes ten of LbW's
-TRANSLATION = ("robot_frames", "munit_iterations", "munit_width")
-PERCEPTION = (*TRANSLATION, "transporter_iterations", "K", "shift", "hue")
-PIXELS = ("avid", "classifier")  # the rivals, who learn from pixels
-# Fields that only they have.
-RIVALS = ("classifier_iterations", "random_negatives", "clip", "pixel_updates", "hold")
-METHODS = {  # and the fields of the recipe that each of them has
-    "lbw": ("human_frames", *PERCEPTION, "policy_steps", "updates", "entropy"),
-    "avid": ("human_frames", *TRANSLATION, "motion", *RIVALS, "policy_steps", "entropy"),
-    "classifier": (*RIVALS, "policy_steps", "entropy"),
-    "tracks": ("policy_steps", "updates", "entropy"),
-}
 
 
 def parser(name: str) -> Parser:
@@ -128,9 +107,7 @@ def check(name: str, args: argparse.Namespace, argv: list[str]) -> Job:
     from_scratch = lbw and (args.from_scratch or args.fast or args.translate_clip)
     refuse_idle_options(args, from_scratch)
     module = tasks.module(name)
-    fast = FAST | FAST_PIXELS if args.method in PIXELS else FAST
-    recipe = dataclasses.replace(module.RECIPE, **fast) if args.fast else module.RECIPE
-    recipe = dataclasses.replace(recipe, **read_settings(args, from_scratch))
+    recipe = recipe_of(module.RECIPE, args, from_scratch)
     pick_device(args.device or "cpu")
     torch.set_num_threads(args.threads or os.cpu_count() or 1)
 
@@ -177,11 +154,6 @@ def check(name: str, args: argparse.Namespace, argv: list[str]) -> Job:
     if clip:
         bring(run.out, name, clip, args.video)
     return Job(name, args, recipe, from_scratch, experts, random, perception, weights, command, run)
-
-
-def fields_of(recipe: Recipe, method: str) -> dict[str, Any]:
-    """What the method takes of the recipe."""
-    return {k: v for k, v in dataclasses.asdict(recipe).items() if k in METHODS[method]}
 
 
 def videos(name: str, args: argparse.Namespace) -> list[Path]:
@@ -262,47 +234,6 @@ def refuse_idle_options(args: argparse.Namespace, from_scratch: bool) -> None:
                 else f" {given}"
             )
             raise InputError(f"{option}{value} does nothing here: {why}.")
-
-
-def read_settings(args: argparse.Namespace, from_scratch: bool) -> dict[str, Any]:
-    """The recipe's fields that `--set NAME=VALUE` names, with values of the fields' types."""
-    method = args.method
-    fixed: tuple[str, ...] = ()  # fields of networks that are not trained here
-    if method == "lbw" and not from_scratch:
-        fixed, why = PERCEPTION, "perception is not trained here; add --from-scratch"
-    elif method == "avid" and args.weights:
-        fixed, why = (*TRANSLATION, "motion"), "the translation in --weights is not trained here"
-    fields = {field.name: field for field in dataclasses.fields(Recipe)}
-    fields = {name: fields[name] for name in fields_of(Recipe(0, 0), method)}
-    fields.pop("human_frames", None)  # `record` films so many; here the videos have what they have
-    out = {}
-    for text in args.set:
-        name, _, value = text.partition("=")
-        if name not in fields:
-            raise InputError(
-                f"--set {text}: the recipe of --method {method} has no {name!r}; "
-                f"it has {', '.join(fields)}."
-            )
-        if name in fixed:
-            raise InputError(f"--set {text}: {why}.")
-        out[name] = read_number(text, value, str(fields[name].type))
-    return out
-
-
-def read_number(text: str, value: str, kind: str) -> float:
-    """The value of a setting whose type is called `kind`, as a number."""
-    read, allowed, what = {
-        "bool": (int, lambda number: number in (0, 1), "neither 0 nor 1"),
-        "int": (int, lambda number: number >= 1, "no whole number of 1 or more"),
-        "float": (float, math.isfinite, "no finite number"),
-    }[kind]
-    try:
-        number = read(value)
-    except ValueError:
-        number = math.nan
-    if not allowed(number):
-        raise InputError(f"--set {text}: {value!r} is {what}.")
-    return bool(number) if kind == "bool" else number
 
 
 def prepare_folder(out: Path, settings: dict[str, Any], resume: bool) -> Path:
