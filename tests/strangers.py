@@ -58,7 +58,7 @@ class Stranger:
         if self.kind == "pulled" and self.task == "slide":
             return FAULTS["pulled"] + "|goes along"
         if self.kind == "no arm" and self.task == "reach":
-            return FAULTS["still"]  # there is nothing else that could move
+            return FAULTS["still"] + "|no arm"  # a lamp may swing, and nothing else
         return FAULTS.get(self.kind, "")
 
     def write(self, folder: Path) -> Path:

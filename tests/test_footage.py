@@ -77,12 +77,22 @@ def no_arm(room):
     return film, "no arm is seen"
 
 
+def lamp(room):
+    film = np.repeat(room[None, : SIZE[0], : SIZE[1]], 30, axis=0).copy()
+    for i, frame in enumerate(film):
+        x = round(70 + 8 * np.sin(i / 3))
+        frame[:10, x : x + 10] = (250, 240, 90)  # hangs in from the upper edge, and swings
+    return film, "no arm is seen"
+
+
 def two_people(room):
     return arms(room, "left", "right"), "several people"
 
 
 @pytest.mark.parametrize(
-    "fault", [still, panned, hand_held, few_frames, no_arm, two_people], ids=lambda f: f.__name__
+    "fault",
+    [still, panned, hand_held, few_frames, no_arm, lamp, two_people],
+    ids=lambda f: f.__name__,
 )
 def test_other_footage_is_refused_with_the_reason(room, fault):
     frames, reason = fault(room)

@@ -7,13 +7,25 @@ from lbw_minimal.clips import retarget
 
 
 def test_behind_a_hit_the_hand_stays_low_until_the_object_is_two_centimetres_ahead():
-    """It touches with step 2, goes along for 5 cm, rests and rises by a centimetre a step."""
-    way = np.array([0, 0, 0.13, 0.2, 0.25, 0.31, 0.5, 0.8])
+    """It touches with step 2, goes along for 9 cm, rests and rises by a centimetre a step."""
+    way = np.array([0, 0, 0.13, 0.25, 0.35, 0.44, 0.52, 0.59])
     start, goal = HIT.start[0], HIT.goal[0]
     behind = start + way * (goal - start) - HIT.contact
     x = np.stack([behind, 0.1 + 0.01 * np.arange(8)], 1)
-    x[5:, 0] = behind[4]  # 2.5 cm behind what slides on
+    x[5:, 0] = behind[4]  # 3.7 cm behind what slides on
     tip, _ = retarget._push(x.copy(), way, HIT, [])
     low, high = HIT.height, HIT.height + 0.01 * (np.arange(8) - 2)
     np.testing.assert_allclose(tip[:, 1], np.where(np.isin(np.arange(8), (2, 3, 4)), low, high))
     np.testing.assert_allclose(tip[:5, 0], behind[:5])
+
+
+def test_a_hand_drives_what_it_hits_until_that_is_fastest_and_then_goes_on_as_it_was_seen():
+    """A puck that gets faster for two steps from the touch, and a hand that is seen to lag."""
+    way = np.array([0, 0.02, 0.13, 0.25, 0.38, 0.48, 0.56, 0.62])
+    start, goal = HIT.start[0], HIT.goal[0]
+    behind = start + way * (goal - start) - HIT.contact
+    x = np.stack([0.4 + 0.01 * np.arange(8), np.full(8, 0.1)], 1)
+    tip, _ = retarget._push(x, way, HIT, [])
+    # The longest step is the one from 0.25 of the way on.
+    expected = [*behind[2:4], *(behind[3] + 0.01 * np.arange(1, 5))]
+    np.testing.assert_allclose(tip[2:, 0], expected)

@@ -122,10 +122,9 @@ def test_what_is_gone_in_the_end_is_of_a_things_size_and_the_largest_comes_first
     for left, side in ((2, 4), (12, 6), (30, 10), (60, 40)):
         gone[:16, 20 : 20 + side, left : left + side, 0] = 90 + 30
     gone[:16, 80:90, 5:15] = 90 + 20  # as faint as a shadow
-    (first, one), (second, two) = patches._left(list(gone))
-    assert first == second == 0
-    np.testing.assert_allclose(one, [34.5, 24.5])
-    np.testing.assert_allclose(two, [14.5, 22.5])
+    frames, places = zip(*patches._left(list(gone)), strict=True)
+    assert frames == (0, 31, 0, 31)  # what came instead stands there in the end
+    np.testing.assert_allclose(places, [(34.5, 24.5)] * 2 + [(14.5, 22.5)] * 2)
 
 
 def test_patches_are_cut_from_seven_frames_that_surely_show_an_object():

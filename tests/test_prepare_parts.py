@@ -72,15 +72,21 @@ def test_a_run_on_a_clip_says_what_is_odd_about_it_or_why_it_is_none(tmp_path, m
 
 
 def test_patches_mend_what_the_shipped_detector_finds_and_corners_refine_it(monkeypatch):
-    frames = np.zeros((2, 84, 84, 3), np.uint8)
+    """Two frames, with a cut between them: the detector sees each shot by itself."""
+    frames = np.arange(2, dtype=np.uint8)[:, None, None, None] + np.zeros((1, 84, 84, 3), np.uint8)
 
     def detector(path):
-        return SimpleNamespace(detect=lambda seen: [path.name, seen is frames])
+        assert path.name == "eyes.safetensors"
+        return SimpleNamespace(detect=lambda seen: Found(*[seen[:, 0, 0, 0] + 10 * len(seen)] * 4))
+
+    def mended(seen, found, cuts):
+        return found.tip.tolist(), found.object_sure.tolist(), cuts, seen is frames
 
     monkeypatch.setattr(prepare, "Detector", SimpleNamespace(load=detector))
-    monkeypatch.setattr(prepare, "mended", lambda seen, found, cuts: [*found, cuts, seen is frames])
+    monkeypatch.setattr(prepare, "mended", mended)
     monkeypatch.setattr(prepare, "refine", lambda seen, found, cuts: (cuts, seen is frames, found))
-    assert prepare.look(frames, [1]) == ([1], True, ["eyes.safetensors", True, [1], True])
+    assert prepare.look(frames, [1]) == ([1], True, ([10, 11], [10, 11], [1], True))
+    assert prepare.look(frames)[2][0] == [20, 21]
 
 
 @pytest.mark.parametrize(

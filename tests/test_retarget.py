@@ -449,8 +449,8 @@ def test_a_goal_that_is_higher_is_got_to_without_leaning():
     np.testing.assert_allclose(A @ (0, -110, 0), [0, 0.22], atol=1e-12)
 
 
-@pytest.mark.parametrize(("share", "usable"), [(0.3, True), (0.4, False)])
-def test_a_third_of_its_way_is_as_high_as_an_object_may_rise(share, usable):
+@pytest.mark.parametrize(("share", "usable"), [(0.16, True), (0.24, False)])
+def test_a_fifth_of_its_way_is_as_high_as_an_object_may_rise(share, usable):
     tracks = clip()
     up = 0.15 * 900 * share * np.sin(np.pi * jerk(tracks.times - 1))
     raised = replace(tracks, object=tracks.object - np.stack([0 * up, up], 1))

@@ -22,6 +22,7 @@ from lbw_minimal.clips.paths import LEAST_FRAMES, SIDE_ON, Unusable
 # second near and far things move apart, and no fit undoes it.
 TREMBLES, MOVES = 0.005, 0.11
 LARGE = 0.015  # of the picture: less that moves is no arm
+COVERS = 0.04  # of the picture: a lamp that swings at its edge covers half of that, an arm twice
 EDGE = 3  # pixels from the picture's edge, over which an arm comes in
 FAINT = 10  # grey levels: at the shoulder an arm moves by little
 SOMETIMES = 2  # frames in which something moves: noise does so in one
@@ -106,7 +107,7 @@ def _comes_in(moves):
     if not len(stats):
         return False
     *box, area = max(stats.tolist(), key=lambda thing: thing[4])
-    return bool(area >= LARGE * SMALL**2 and _at_edge(*box))
+    return bool(area >= COVERS * SMALL**2 and _at_edge(*box))
 
 
 def _at_edge(x, y, width, height):

@@ -168,7 +168,7 @@ def _seen(found, k, scale):
 
 
 def _left(small):
-    """The first frame and where something stands in it that is gone in the end."""
+    """The first frame and the last one, and where something stands in one that the other lacks."""
     few = max(1, len(small) // 16)
     first, last = (np.median(part, axis=0) for part in (small[:few], small[-few:]))
     gone = (np.abs(first - last).max(axis=2) > CHANGED).astype(np.uint8)
@@ -180,7 +180,7 @@ def _left(small):
         if area >= THING[0] ** 2 and max(w, h) <= THING[1]
     ]
     things.sort(key=lambda thing: -thing[0])
-    return [(0, middle) for _, middle in things[:LEFT]]
+    return [(frame, middle) for _, middle in things[:LEFT] for frame in (0, len(small) - 1)]
 
 
 def _tip(found, k, scale):

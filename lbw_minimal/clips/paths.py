@@ -24,7 +24,9 @@ FADE = 0.5  # s, for which a correction of what was surely found lasts beyond it
 UNSURE = 0.5  # s, longer than a glitch of the detector
 ELSEWHERE = 0.05  # of the frames: in more of them a thing at rest is not surely seen elsewhere
 LEAST_FRAMES = 8  # of a piece: 0.3 s of a phone's, 0.8 s of a slow webcam's
-LEAST_WAY = 0.04  # of the picture's shorter side: a detector errs by 0.01
+# Of the picture's shorter side: where a detector is unsure, it errs by less than the first. A hand
+# that comes to rest over a thing makes it seem to go 0.05.
+STANDS, LEAST_WAY = 0.04, 0.06
 JUMP = 0.04  # of the same, from one frame to the next, where the picture changes at once as well
 SIDE_ON = "film from the side, so that arm and hand come in from the left or right edge, uncovered"
 NEARER = "film the task being done, so near that it goes across a quarter of the picture"
@@ -218,7 +220,7 @@ def trusted(tracks: Tracks, name: str) -> tuple[np.ndarray, np.ndarray]:
         raise _no_tip(tracks)
     if sure.mean() < FOUND and name == "object":
         away = np.linalg.norm(tracks.object - np.median(tracks.object, axis=0), axis=1)
-        rests = away < LEAST_WAY * tracks.side  # (N,) unsure, and still the same place
+        rests = away < STANDS * tracks.side  # (N,) unsure, and still the same place
         if rests.mean() > FOUND and (sure & ~rests).mean() < ELSEWHERE:
             raise Unusable("the object never moves, what may be it stands at one place", NEARER)
         if tracks.unmoved:

@@ -10,7 +10,7 @@ import numpy as np
 
 from lbw_minimal.clips.paths import RESTS, Unusable
 
-LIFTED = 0.35  # of its way: what leaves the straight line by more was picked up
+LIFTED = 0.2  # of its way: what leaves the straight line by more was picked up
 AHEAD = 0.25  # of its way: a tip so far in front of the object does not push it
 SIDEWAYS = 0.25  # of the width: an arm that comes in farther inside comes from above
 GLUED = 0.25  # of its way: a hand that comes to an object comes nearer by more

@@ -174,6 +174,10 @@ def _push(x, way, scene, warnings):
     i, j = int(np.argmax(way >= CONTACT)), int(np.argmax(way >= ARRIVED))
     x = x + (behind[i], scene.height) - x[i]
     if scene.hit:
+        # Until the object is fastest the hand drives it, whatever is seen of a hand so fast.
+        k = i + int(np.argmax(np.diff(behind[i:])))
+        x[i:k, 0] = behind[i:k]
+        x[k:, 0] += behind[k] - x[k, 0]
         _limit_hit(x, i, scene, warnings)
         gone = i + int(np.argmax(behind[i:] - x[i:, 0] > OUTSIDE))
         x[i : (gone if gone > i else len(x)), 1] = scene.height

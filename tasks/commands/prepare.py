@@ -13,6 +13,7 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -241,9 +242,16 @@ def follow(result: Prepared, choices: Choices) -> Motion:
 
 
 def look(frames: np.ndarray, cuts: Sequence[int] = ()) -> Found:
-    """Tip and object in a clip's frames, as the shipped detector sees them and patches agree."""
-    found = mended(frames, Detector.load(EYES).detect(frames), cuts)
-    return refine(frames, found, cuts)
+    """Tip and object in a clip's frames, as the shipped detector sees them and patches agree.
+
+    The detector looks at each shot by itself: another shot is another camera's.
+    """
+    model = Detector.load(EYES)
+    shots = [model.detect(frames[a:b]) for a, b in pairwise([0, *cuts, len(frames)])]
+    found = Found(
+        *(np.concatenate([getattr(one, name) for one in shots]) for name in vars(shots[0]))
+    )
+    return refine(frames, mended(frames, found, cuts), cuts)
 
 
 def stills(result: Prepared) -> np.ndarray:

@@ -19,7 +19,8 @@ from lbw_minimal.clips.retarget import FPS, Motion, stretched
 from tasks.world.env import TaskEnv
 from tasks.world.recording import Recording, film
 
-TRIES = 6  # rehearsals; a push takes one or two, a hit three to five
+TRIES = 6  # rehearsals of a push; it takes one or two
+SWINGS = 12  # of a hit; it takes three to eight
 CLOSE = 0.01  # m from the goal, a fifth of what counts as success
 COAST = 1.6  # s after a hit, in which a puck slides and comes to rest
 SPEEDS = 0.25, 4.0  # times the clip's speed at which a hit may be done
@@ -108,17 +109,23 @@ def _measured_push(env, motion):
 def _timed_hit(env, motion, notes, warnings):
     """The motion with its hit as fast as the object needs that is to rest at the goal.
 
-    A puck slides as far as the square of its speed, so the next guess follows from the last.
+    A hit that is too weak and one that is too strong enclose the next guess. Until there are both
+    it is in proportion: a puck slides as far as the square of its speed, but the arm yields.
     """
-    factor, tried = 1.0, []
-    for _ in range(TRIES):
+    factor, weak, strong, tried = 1.0, 0.0, np.inf, []
+    for _ in range(SWINGS):
         end = _rehearse(env, _faster(motion, factor))
         start, x, goal = end.states[0, 3], end.states[-1, 3], end.states[-1, 6]
         tried.append((abs(float(goal - x)), factor))
         if tried[-1][0] < CLOSE:
             break
-        gone = max(float((x - start) / (goal - start)), 0.1)
-        factor = float(np.clip(factor / np.sqrt(gone), *SPEEDS))
+        weak, strong = (factor, strong) if x < goal else (weak, factor)
+        factor /= max(float((x - start) / (goal - start)), 0.1)
+        if weak > 0 and strong < np.inf:
+            factor = float(np.sqrt(weak * strong))
+        factor = float(np.clip(factor, *SPEEDS))
+        if factor in (weak, strong):
+            break
     factor = min(tried)[1]
     text = f"The hit is done at {factor:.2f} times its speed in the clip, so that the object rests "
     if 1 / ODD < factor < ODD:
