@@ -116,15 +116,14 @@ def test_the_tip_is_known_where_it_is_seen_in_two_fifths_of_the_frames():
     assert patches._tip(found([0, 2, 3]), k, 0.5) is None
 
 
-def test_what_is_gone_in_the_end_is_of_a_things_size_and_the_largest_comes_first():
+def test_what_has_gone_or_come_in_the_end_is_of_a_things_size_and_the_largest_comes_first():
     """Squares of 4, 6, 10 and 40 pixels that stand in the first frames and not in the last."""
     gone = np.full((32, 100, 120, 3), 90, np.uint8)
     for left, side in ((2, 4), (12, 6), (30, 10), (60, 40)):
         gone[:16, 20 : 20 + side, left : left + side, 0] = 90 + 30
     gone[:16, 80:90, 5:15] = 90 + 20  # as faint as a shadow
-    frames, places = zip(*patches._left(list(gone)), strict=True)
-    assert frames == (0, 31, 0, 31)  # what came instead stands there in the end
-    np.testing.assert_allclose(places, [(34.5, 24.5)] * 2 + [(14.5, 22.5)] * 2)
+    np.testing.assert_allclose(patches._changed(list(gone)), [(34.5, 24.5), (14.5, 22.5)])
+    np.testing.assert_allclose(patches._changed(list(gone[::-1])), [(34.5, 24.5), (14.5, 22.5)])
 
 
 def test_patches_are_cut_from_seven_frames_that_surely_show_an_object():
@@ -186,5 +185,5 @@ def test_patches_at_the_pictures_edge_are_as_large_as_elsewhere(monkeypatch):
     monkeypatch.setattr(patches, "_path", lambda small, patch, tip: cut.append(patch.shape[:2]))
     frame = np.random.default_rng(0).integers(0, 255, (90, 120, 3), dtype=np.uint8)
     places = [(0, np.array(at, float)) for at in ((0, 0), (119, 89), (200, -5), (60, 45))]
-    patches.paths(np.stack([frame, frame]), places, None, 1.0)
+    patches.paths([frame, frame], places, None)
     assert cut == 4 * [(13, 13), (19, 19)]

@@ -18,13 +18,18 @@ def clip():
     """A hand comes to a box and pushes it on; the frames, the hand's path and the box's."""
     hand = np.stack([np.interp(np.arange(T), [0, 5, 35], [20, 20, 120]), np.full(T, 60)], 1)
     box = np.stack([np.maximum(75, hand[:, 0] + 15), np.full(T, 64)], 1)
+    return acted(hand, box), hand, box
+
+
+def acted(hand, box):
+    """The frames (T, H, W, 3) uint8 of those paths (T, 2)."""
     frames = np.repeat(cv2.GaussianBlur(room(H, W), (0, 0), 2)[None], T, axis=0)
     for frame, (x, y), (bx, by) in zip(frames, hand.astype(int), box.astype(int), strict=True):
         cv2.rectangle(frame, (bx - 8, by - 8), (bx + 8, by + 8), (200, 40, 30), -1)
         cv2.circle(frame, (bx, by), 4, (240, 240, 60), -1)
         cv2.rectangle(frame, (x - 6, 0), (x + 6, y), (40, 60, 110), -1)
         cv2.circle(frame, (x, y), 7, (220, 170, 140), -1)
-    return frames, hand, box
+    return frames
 
 
 def found(hand, thing):
@@ -48,6 +53,13 @@ def test_an_object_that_was_missed_until_the_touch_is_followed_back(clip):
     frames, hand, box = clip
     late = np.where(np.arange(T)[:, None] < 20, hand, box)
     assert off(mended(frames, found(hand, late)), box) < 4
+
+
+def test_a_hit_thing_whose_first_place_the_hand_hides_is_found_where_it_got_to(clip):
+    hand = np.stack([np.interp(np.arange(T), [0, 5, 20], [20, 20, 75]), np.full(T, 60)], 1)
+    box = np.stack([np.interp(np.arange(T), [16, 30], [75, 135]), np.full(T, 64)], 1)
+    frames = acted(hand, box)
+    assert off(mended(frames, found(hand, hand)), box) < 4
 
 
 def test_each_shot_has_its_own_path(clip):

@@ -3,9 +3,9 @@
 Not from the paper. A detector that looks at single frames takes a hand for the object now and then,
 or a thing that nobody touches. An object is one patch of the picture: it rests while the hand comes
 near, and it goes along with it, or by itself, later on. So patches are cut out where the detector
-saw an object, in several frames, and where something stands that is gone in the end; each is looked
-for in all frames; and the path counts on which a patch stays like itself, rests first, and moves
-later.
+saw an object, in several frames, and where something stands that is gone in the end, or has come;
+each is looked for in all frames; and the path counts on which a patch stays like itself, rests
+first, and moves later.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ ANCHORS = 7  # of these, from which patches are cut
 HALVES = 6, 9
 CHANGED = 24  # grey levels between the first and the last frame
 THING = 5, 32  # pixels: what is smaller is no object, what is larger the arm
-LEFT = 4  # things that are looked at because they are gone in the end
+LEFT = 4  # things that are looked at because they are gone in the end, or have come
 PLAIN = 2  # grey levels, the deviation of a patch in which nothing is seen
 PEAKS = 10  # places in a frame where a patch may be
 APART = 4  # pixels between these; paths that differ by less go the same way
@@ -119,7 +119,11 @@ def mended(frames: np.ndarray, found: Found, cuts: Sequence[int] = ()) -> Found:
         own = Path(part.object[k] * scale, part.object_sure[k], tip, side)
         if own.seen and own.pushed:
             continue
-        best = chosen(paths(frames[first:last][k], _seen(part, k, scale), tip, scale))
+        small = shrunk(frames[first:last][k], scale)
+        changed = _changed(small)
+        best = chosen(paths(small, _seen(part, k, scale) + [(0, at) for at in changed], tip))
+        if best is None:  # a small thing may be hidden where it was, and in sight where it got to
+            best = chosen(paths(small, [(len(k) - 1, at) for at in changed], tip))
         if best is not None and not best.agrees(own, 0.9):  # a patch is known to a pixel only
             along = np.arange(last - first)
             for axis in (0, 1):
@@ -140,18 +144,21 @@ def chosen(some: list[Path]) -> Path | None:
     return max(still, key=lambda path: path.worth) if len(still) > len(some) / 2 else None
 
 
-def paths(
-    frames: np.ndarray, places: list[tuple[int, np.ndarray]], tip: np.ndarray | None, scale: float
-) -> list[Path]:
-    """The paths of patches in the frames (n, H, W, 3) uint8: of those about places, (frame, (2,)),
-    in pixels of frames that are so much smaller, and of what is gone in the end."""
+def shrunk(frames: np.ndarray, scale: float) -> list[np.ndarray]:
+    """The frames (n, H, W, 3) uint8, so much smaller, and without their finest noise."""
     size = round(frames.shape[2] * scale), round(frames.shape[1] * scale)
-    small = [
+    return [
         cv2.GaussianBlur(cv2.resize(frame, size, interpolation=cv2.INTER_AREA), (3, 3), 0)
         for frame in frames
     ]
-    out = []
-    for i, middle in [*places, *_left(small)]:
+
+
+def paths(
+    small: list[np.ndarray], places: list[tuple[int, np.ndarray]], tip: np.ndarray | None
+) -> list[Path]:
+    """The paths of patches in frames (h, w, 3) uint8: of those about places, (frame, (2,))."""
+    size, out = small[0].shape[1::-1], []
+    for i, middle in places:
         for half in HALVES if min(size) > 3 * max(HALVES) else ():
             x, y = np.clip(np.round(middle).astype(int), half, np.array(size) - half - 1)
             patch = small[i][y - half : y + half + 1, x - half : x + half + 1]
@@ -167,20 +174,20 @@ def _seen(found, k, scale):
     return [(i, found.object[k[i]] * scale) for i in sure[np.unique(some)]]
 
 
-def _left(small):
-    """The first frame and the last one, and where something stands in one that the other lacks."""
+def _changed(small):
+    """Where the first frame differs from the last, by things of an object's size: (2,) each."""
     few = max(1, len(small) // 16)
     first, last = (np.median(part, axis=0) for part in (small[:few], small[-few:]))
-    gone = (np.abs(first - last).max(axis=2) > CHANGED).astype(np.uint8)
-    gone = cv2.morphologyEx(gone, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
-    _, _, stats, middles = cv2.connectedComponentsWithStats(gone)
+    differs = (np.abs(first - last).max(axis=2) > CHANGED).astype(np.uint8)
+    differs = cv2.morphologyEx(differs, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+    _, _, stats, middles = cv2.connectedComponentsWithStats(differs)
     things = [
         (area, middle)
         for (_, _, w, h, area), middle in zip(stats[1:].tolist(), middles[1:], strict=True)
         if area >= THING[0] ** 2 and max(w, h) <= THING[1]
     ]
     things.sort(key=lambda thing: -thing[0])
-    return [(frame, middle) for _, middle in things[:LEFT] for frame in (0, len(small) - 1)]
+    return [middle for _, middle in things[:LEFT]]
 
 
 def _tip(found, k, scale):

@@ -49,7 +49,7 @@ def check_way(
             "it, is the hand",
             "film the task being done, with an object that is seen before the hand gets to it",
         )
-    aside = (thing[: j + 1] - start) @ (np.array([-along[1], along[0]]) / length**2)
+    aside = (thing[i : j + 1] - start) @ (np.array([-along[1], along[0]]) / length**2)
     if np.abs(aside).max() > LIFTED:
         raise Unusable(
             f"the object leaves its straight way by {np.abs(aside).max():.0%} of its length",
