@@ -29,3 +29,10 @@ def test_a_hand_drives_what_it_hits_until_that_is_fastest_and_then_goes_on_as_it
     # The longest step is the one from 0.25 of the way on.
     expected = [*behind[2:4], *(behind[3] + 0.01 * np.arange(1, 5))]
     np.testing.assert_allclose(tip[2:, 0], expected)
+
+
+def test_a_hand_that_has_hit_does_not_go_back_while_the_object_slides():
+    way = np.array([0, 0.02, 0.13, 0.25, 0.35, 0.44, 0.52, 0.59])
+    x = np.stack([0.5 - 0.01 * np.arange(8), np.full(8, 0.1)], 1)
+    tip, _ = retarget._push(x, way, HIT, [])
+    np.testing.assert_allclose(tip[2:, 0], HIT.start[0] + 0.13 * 0.41 - HIT.contact)

@@ -177,7 +177,7 @@ def _push(x, way, scene, warnings):
         # Until the object is fastest the hand drives it, whatever is seen of a hand so fast.
         k = i + int(np.argmax(np.diff(behind[i:])))
         x[i:k, 0] = behind[i:k]
-        x[k:, 0] += behind[k] - x[k, 0]
+        x[k:, 0] = np.maximum.accumulate(x[k:, 0] + behind[k] - x[k, 0])
         _limit_hit(x, i, scene, warnings)
         gone = i + int(np.argmax(behind[i:] - x[i:, 0] > OUTSIDE))
         x[i : (gone if gone > i else len(x)), 1] = scene.height
