@@ -61,6 +61,18 @@ def test_a_usable_clip_is_told_with_its_warnings_and_how_to_learn_from_it(
     assert asked[-1] == ("push", result, command, "")
 
 
+def test_a_clip_that_is_not_usable_leaves_no_film_of_another_one(tmp_path, monkeypatch):
+    monkeypatch.setattr(prepare, "prepare", lambda *what: prepared(why_not="no arm is seen."))
+    monkeypatch.setattr(prepare, "write", lambda out, *what: out / "page")
+    film, clip = tmp_path / "reenactment.mp4", tmp_path / "my.mp4"
+    for file in (film, clip):
+        file.write_bytes(b"")
+    assert prepare.main(["push", str(film), "--out", str(tmp_path)]) == 2
+    assert film.exists()  # the clip itself
+    assert prepare.main(["push", str(clip), "--out", str(tmp_path)]) == 2
+    assert clip.exists() and not film.exists()
+
+
 def test_a_run_on_a_clip_says_what_is_odd_about_it_or_why_it_is_none(tmp_path, monkeypatch, capsys):
     result = prepared(warnings=["It is dark."])
     monkeypatch.setattr(prepare, "prepare", lambda name, path: result)

@@ -144,6 +144,9 @@ def main(argv: list[str]) -> int:
         print(f"not usable: {error}")
         return 2
     make_folder(out)
+    if result.why_not and args.file.resolve() != (out / FILM).resolve():
+        for before in (FILM, STILLS):  # of another clip, which nobody is to learn from by mistake
+            (out / before).unlink(missing_ok=True)
     learn = shlex.join(["python", "-m", "tasks", args.task, "--video", str(out / FILM)])
     command = shlex.join(["python", "-m", "tasks", "prepare", *argv])
     page = write(out, args.task, result, command, "" if result.why_not else learn)
