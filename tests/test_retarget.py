@@ -206,6 +206,17 @@ def test_a_reach_goes_from_the_arms_start_to_the_mark():
     assert motion.warnings == []  # there is no object to miss
 
 
+@pytest.mark.parametrize(("share", "usable"), [(0.05, False), (0.07, True)])
+def test_an_object_that_goes_by_less_than_a_sixteenth_of_the_picture_never_moves(share, usable):
+    """A hand that comes to rest over a thing, and hides half of it, makes it seem to do so."""
+    small = clip(camera=CAMERA * share * SIDE / (0.15 * 900))
+    if usable:
+        lay(small, SCENE)
+    else:
+        with pytest.raises(Unusable, match="the object never moves, or by 24 pixels only"):
+            lay(small, SCENE)
+
+
 @pytest.mark.parametrize(("share", "usable"), [(0.09, False), (0.12, True)])
 def test_a_hand_that_stirs_by_less_than_a_tenth_of_the_picture_does_not_reach(share, usable):
     scene = replace(SCENE, start=(0.46, 0.12), goal=(0.68, 0.06), tip=(0.46, 0.12), contact=None)

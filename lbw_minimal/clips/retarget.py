@@ -17,8 +17,10 @@ import numpy as np
 from lbw_minimal.clips.paths import (
     FOUND,
     LEAST_WAY,
+    NEARER,
     REST,
     RESTS,
+    STANDS,
     Tracks,
     Unusable,
     ends,
@@ -97,16 +99,18 @@ def lay(tracks: Tracks, scene: Scene, mirror: bool | None = None) -> Motion:
     tip = thing = low_pass(*trusted(tracks, "tip"), t)  # (N, 2) pixels
     if touched:
         thing = low_pass(*trusted(tracks, "object"), t)
-    what, least = ("object", LEAST_WAY) if touched else ("hand", LITTLE)
+    what, least = ("object", STANDS) if touched else ("hand", LITTLE)
     start, end = ends(thing, least * tracks.side, what)
+    gone = float(np.linalg.norm(end - start))
     if gets_faster(thing):
-        gone = float(np.linalg.norm(end - start))
         if gone < LITTLE * tracks.side:
             raise Unusable(
                 f"the clip ends {gone:.0f} pixels on its way, while the {what} still gets faster",
                 "film on until all is done and rests",
             )
         warnings.append(f"The clip ends while the {what} still gets faster: was it not done yet?")
+    if gone < LEAST_WAY * tracks.side:
+        raise Unusable(f"the {what} never moves, or by {gone:.0f} pixels only", NEARER)
     if mirror is None:
         mirror = bool(end[0] < start[0])
         if mirror:
