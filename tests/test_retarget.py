@@ -472,6 +472,12 @@ def test_a_fifth_of_its_way_is_as_high_as_an_object_may_rise(share, usable):
             lay(raised, SCENE)
 
 
+def test_what_is_seen_elsewhere_before_the_hand_comes_was_not_lifted():
+    tracks = clip()
+    passes = (tracks.times > 0.3) & (tracks.times < 0.5)
+    lay(replace(tracks, object=tracks.object - passes[:, None] * (0, 0.3 * 0.15 * 900)), SCENE)
+
+
 @pytest.mark.parametrize(("ahead", "usable"), [(0.15, True), (0.35, False)])
 def test_a_hand_a_quarter_of_the_way_before_the_object_does_not_push_it(ahead, usable):
     tracks = clip()
