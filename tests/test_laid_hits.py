@@ -24,10 +24,10 @@ def test_a_hand_drives_what_it_hits_until_that_is_fastest_and_then_goes_on_as_it
     way = np.array([0, 0.02, 0.13, 0.2, 0.32, 0.45, 0.55, 0.62])
     start, goal = HIT.start[0], HIT.goal[0]
     behind = start + way * (goal - start) - HIT.contact
-    x = np.stack([0.4 + 0.01 * np.arange(8), np.full(8, 0.1)], 1)
+    x = np.stack([0.4 + 0.005 * np.arange(8), np.full(8, 0.1)], 1)
     tip, _ = retarget._push(x, way, HIT, [])
     # The longest step is the one from 0.32 of the way on.
-    expected = [*behind[2:5], *(behind[4] + 0.01 * np.arange(1, 4))]
+    expected = [*behind[2:5], *(behind[4] + 0.005 * np.arange(1, 4))]
     np.testing.assert_allclose(tip[2:, 0], expected)
 
 
