@@ -95,9 +95,7 @@ def main(fd: int, readable: list[str]) -> None:
             job = wire.decode(wire.receive(control))
         except EOFError:
             return
-        for source, course in (*job["helpers"], *job["below"]):
-            if course:
-                answer.learn(source)
+        answer.prepare(job)
         theirs, ours = socket.socketpair()
         below, above = socket.socketpair()
         socket.send_fds(control, [b"."], [theirs.fileno()])
