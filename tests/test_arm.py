@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tasks.reach import Reach
-from tasks.world.bodies import panda
+from tasks.world.bodies import human, panda
 
 EMBODIMENTS = ("robot", "human")
 
@@ -19,6 +19,11 @@ def test_the_pandas_limits_are_those_of_its_file():
     ]
     assert panda().effort == tuple(float(limit.get("effort")) for limit in limits)
     assert panda().speed == tuple(float(limit.get("velocity")) for limit in limits)
+
+
+def test_the_humans_wrist_is_weaker_than_its_elbow_and_that_than_its_shoulder():
+    assert human().effort == (90, 90, 60, 60, 20, 20, 20)  # Nm
+    assert human().speed == panda().speed
 
 
 @pytest.fixture(params=EMBODIMENTS)

@@ -57,6 +57,17 @@ def test_an_arm_is_no_camera_even_where_the_room_has_nothing_else(furnished):
     assert camera.extent(camera.sway(frames), H, W) == 0
 
 
+def test_a_pan_is_followed_behind_a_large_thing_that_goes_another_way():
+    """A quarter of the picture does not fit, and so weighs little."""
+    x = 1.5 * np.arange(T)
+    frames = through(shifted(x))
+    thing = cv2.GaussianBlur(room(90, 120, seed=7), (0, 0), 1)
+    for t, frame in enumerate(frames):
+        frame[50:140, 20 + 4 * t : 140 + 4 * t] = thing
+    sways = camera.sway(frames)
+    np.testing.assert_allclose(sways[-1], [[1, 0, x[-1]], [0, 1, 0]], atol=1.2)
+
+
 def test_light_that_flickers_moves_nothing():
     light = 1 + 0.1 * np.sin(np.arange(T))[:, None, None, None]
     frames = np.clip(through(shifted(np.zeros(T))) * light, 0, 255).astype(np.uint8)

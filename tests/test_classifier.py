@@ -89,6 +89,14 @@ def test_small_images_keep_colour_and_place():
     assert torch.allclose(image[1:], torch.tensor(-0.6), atol=1e-5)
 
 
+def test_small_images_average_what_is_too_fine_for_them():
+    """Stripes a pixel wide are grey; single pixels taken of them would be black and white."""
+    frames = grey(0, 1)
+    frames[:, :, ::2] = 255
+    image = classifier.small_images(frames)[0, :, 4:-4, 4:-4]
+    assert image.abs().max() < 0.25
+
+
 def test_it_tells_held_out_goal_images_from_others(trained):
     model, _, held = trained
     goals, others = (classifier.logits(model, frames) for frames in goal_frames(held))

@@ -318,6 +318,26 @@ def test_where_times_are_missing_or_stand_still_the_rate_is_believed():
         assert film.losses == ["Its frames have no time stamps; 30 a second were assumed."]
 
 
+def test_of_frames_at_one_moment_the_first_is_kept(monkeypatch):
+    class Film:
+        every, notes, losses = 1, [], []
+        stamps = [0.5, 0.54, 0.54, 0.58, 0.62]
+        frames = np.arange(5, dtype=np.uint8).reshape(5, 1, 1, 1)
+
+        def __init__(self, path, stream, *options):
+            self.stream = stream
+
+        def read(self):
+            pass
+
+    stream = SimpleNamespace(width=1, rate=25.0)
+    monkeypatch.setattr(clips, "_Film", Film)
+    monkeypatch.setattr(clips, "look", lambda path: ([stream], {}))
+    clip = read_clip("film.mp4", cuts=False)
+    assert clip.frames.ravel().tolist() == [0, 1, 3, 4]
+    assert clip.times == pytest.approx([0, 0.04, 0.08, 0.12])
+
+
 def test_the_longest_piece_is_that_of_most_seconds_and_begins_at_0():
     """Three frames in 2 s outlast five in 0.4."""
     frames = np.arange(11, dtype=np.uint8)

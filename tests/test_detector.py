@@ -377,6 +377,16 @@ def test_the_closer_look_counts_where_it_is_surer_and_in_the_clips_pixels():
     assert found.tip_sure[0] == 0.9 and found.object_sure[0] == 0.7
 
 
+def test_where_both_looks_are_sure_the_closer_one_counts():
+    """It sees more pixels of a thing, though the first may be the surer by chance."""
+    place = np.tile(np.float32([[150, 100], [160, 110]]), (10, 1, 1))
+    told = TwoLooks(place, np.tile([0.95, 0.95], (10, 1)), [0.9, 0.2])
+    found = told.detect(np.zeros((10, 200, 300, 3), np.uint8))
+    np.testing.assert_allclose(found.tip[0], [102 + 5, 52 + 6], atol=1)
+    assert found.tip_sure[0] == 0.9
+    np.testing.assert_allclose(found.object[0], [160, 110])
+
+
 def test_a_second_look_that_would_take_in_most_of_the_picture_is_left_out():
     place = np.stack([np.stack([np.linspace(0, 250, 20), np.full(20, 90)], 1)] * 2, 1)
     told = TwoLooks(np.float32(place), np.ones((20, 2)), [1.0, 1.0])

@@ -286,6 +286,25 @@ def test_an_object_that_fell_ends_the_episode_and_stays_where_it_is(name):
     env.close()
 
 
+def test_a_drawer_never_starts_wider_open_than_its_rail_is_long():
+    env = make("drawer", jitter=0.05)
+    for seed in range(8):
+        env.reset(seed=seed)
+        assert -0.15 <= env.world.p.getJointState(env.drawer, 0)[0] <= -0.10
+    env.close()
+
+
+@pytest.mark.parametrize(("height", "lost"), [(0.02, False), (-0.002, True)])
+def test_an_object_is_lost_as_soon_as_its_middle_is_below_the_tables_top(height, lost):
+    """In a step, 40 ms, it falls by 8 mm."""
+    env = make("push")
+    env.reset(seed=0)
+    env.world.p.resetBasePositionAndOrientation(env.cube, (0.6, 0.4, height), (0, 0, 0, 1))
+    _, _, terminated, _, info = env.step(np.zeros(3))
+    assert terminated == info["object_lost"] == lost
+    env.close()
+
+
 def test_a_killed_process_leaves_no_files(tmp_path):
     code = (
         "import os, signal, tasks, gymnasium as gym; "

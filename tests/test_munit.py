@@ -312,6 +312,8 @@ def test_a_translation_has_the_videos_content_and_the_other_domains_style():
     model = Tints()
     s_y = munit.robot_style(model, robot)
     assert s_y.item() == pytest.approx(r + 0.1)
+    two = np.concatenate([robot, human])  # the style is the mean of all frames'
+    assert munit.robot_style(model, two).item() == pytest.approx((r + h) / 2 + 0.1)
     grey = lambda v: round((v + 1) * 127.5)  # noqa: E731
     assert (munit.translate(model, human, s_y) == grey(0.5 * h + 2 * (r + 0.1))).all()
     mean = munit.mean_images(model, human, robot)
@@ -342,6 +344,15 @@ def test_the_style_reaches_every_block_as_means_and_deviations_of_adain():
     for said in (torch.zeros(64), torch.linspace(-0.5, 0.9, 64)):
         decoder.mlp[-1].bias.data = said
         torch.testing.assert_close(decoder(c, torch.ones(1, 8)), by_hand(said))
+
+
+def test_a_style_is_the_mean_of_what_the_whole_picture_shows():
+    """Not of its most striking place: with another object in it a wall keeps most of its style."""
+    torch.manual_seed(0)
+    encoder, v = MUNIT(2).E_s["y"], noise(2)
+    *convolutions, _, _, linear = encoder
+    maps = nn.Sequential(*convolutions)(v)  # (2, 64, h, w)
+    torch.testing.assert_close(encoder(v), linear(maps.mean((2, 3))))
 
 
 def test_codes_images_and_scores_have_the_sizes_that_the_docstrings_say():

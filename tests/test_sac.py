@@ -255,6 +255,16 @@ def test_the_time_limit_is_not_stored_as_the_end(buffers):
     assert len(buffers[0]) == 60 and (buffers[0].data["terminal"] == 0).all()
 
 
+def test_a_buffer_is_told_with_which_transition_an_episode_begins(monkeypatch):
+    """One that keeps each frame once, as `FrameBuffer`, has to know."""
+    told, add = [], ReplayBuffer.add
+    monkeypatch.setattr(
+        ReplayBuffer, "add", lambda buffer, **t: told.append(t["first"]) or add(buffer, **t)
+    )
+    train(Walk(), steps=60, seed=0, random_steps=100, width=8)
+    assert np.flatnonzero(told).tolist() == [0, 20, 40] and len(told) == 60
+
+
 def test_a_transition_is_kept_as_it_happened(buffers):
     """s, a, r and s' of a walk whose laws are known; within an episode s' is the next s."""
     train(Walk(), steps=60, seed=0, random_steps=30, width=8, batch=8)
@@ -481,6 +491,8 @@ def test_all_candidates_act_in_the_same_five_episodes():
     env.reset = lambda seed: starts.append(seed) or reset(seed=seed)
     best_actor(env, sac, 2 * [deepcopy(sac.test_actor.state_dict())], seed=0)
     assert starts[:5] == starts[5:] and len(set(starts)) == 5
+    trained_on = {module._seed(0, episode) for episode in range(100)}
+    assert not trained_on & set(starts)
 
 
 def test_the_three_windows_of_ten_episodes_that_returned_most_are_kept():
@@ -500,6 +512,13 @@ def test_a_training_takes_what_the_papers_table_was_made_with_unless_it_is_told(
     assert (sac.rates, sac.tau, sac.average) == ((1e-3, 1e-3), 0.01, 0.005)
     assert [len(p) for p in sac.actor.net.parameters()] == [128, 128, 128, 128, 2, 2]
     assert [tuple(w.shape) for w in sac.critic.weights] == [(2, 2, 128), (2, 128, 128), (2, 128, 1)]
+
+
+def test_a_buffer_holds_the_whole_training(monkeypatch):
+    held = []
+    monkeypatch.setattr(module, "learn", lambda env, sac, buffer, *_, **more: held.append(buffer))
+    train(Walk(), steps=7000, seed=0)
+    assert held[0].capacity >= 7000
 
 
 def test_averaged_actors_of_the_best_windows_and_of_the_end_compete(monkeypatch):

@@ -117,6 +117,9 @@ def test_identity_is_the_variance_of_the_colour_under_a_keypoint():
     # The first changes from 0 to 1 in one channel, variance 1/2; the second stays red. Their mean
     # is 1/4.
     assert tp.identity(z, y).item() == pytest.approx(0.25, abs=1e-4)
+    # Two keypoints on different things, each of which keeps its colour.
+    z = torch.tensor([[[-0.7, 0.0], [0.7, 0.3]], [[-0.7, 0.5], [0.7, -0.3]]])
+    assert tp.identity(z, y).item() == pytest.approx(0, abs=1e-4)
 
 
 def test_loss_is_equation_7_by_hand():
@@ -231,6 +234,14 @@ def test_r2_by_hand_on_a_held_out_set():
     # 2)^0.5.
     assert tp.r2(z, true, z_held, true_held) == pytest.approx([0.5])
     assert tp.pixel_error(z, true, z_held, true_held) == pytest.approx([2**0.5])
+
+
+def test_without_a_held_out_set_the_last_quarter_is_held_out():
+    """The map is learnt from six of eight frames. In the last two 6 and 8 are 7 and 9, mean 8."""
+    z = np.array([0, 1, 2, 3, 4, 5, 6, 8.0])
+    true = z + [0, 0, 0, 0, 0, 0, 1, 1]
+    assert tp.r2(z[:, None, None], true[:, None]) == pytest.approx([1 - 2 / 2])
+    assert tp.pixel_error(z[:, None, None], true[:, None]) == pytest.approx([1])
 
 
 def test_r2_of_noise_is_below_0_on_average():

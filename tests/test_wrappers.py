@@ -93,13 +93,15 @@ def test_literal_policy_sees_keypoints_alone(reward):
 def test_timed_observation_tells_the_way_to_the_demonstration_and_the_clock():
     reward = timed()
     env = wrap(Film(demonstration()), reward)
-    observations, _ = play(env, 3)
-    z, moved, before, way, clock = np.split(observations[2], [2 * K, 4 * K, 6 * K, 8 * K])
-    np.testing.assert_array_equal(moved, z - observations[1][: 2 * K])
-    np.testing.assert_array_equal(before, observations[1][2 * K : 4 * K])
+    observations, _ = play(env, 12)
+    for t in (2, 11):  # at first all rests
+        z, moved, before, way, clock = np.split(observations[t], [2 * K, 4 * K, 6 * K, 8 * K])
+        np.testing.assert_array_equal(moved, z - observations[t - 1][: 2 * K])
+        np.testing.assert_array_equal(before, observations[t - 1][2 * K : 4 * K])
+        assert (z + way).reshape(K, 2) == pytest.approx(reward.z_E[t + 1], abs=1e-6)
+        assert clock[0] == pytest.approx(t / (len(reward.z_E) - 1))
+    assert np.abs(moved).max() > 1e-3
     assert not observations[0][2 * K : 6 * K].any()  # nothing has moved at the start
-    assert (z + way).reshape(K, 2) == pytest.approx(reward.z_E[3], abs=1e-6)
-    assert clock[0] == pytest.approx(2 / (len(reward.z_E) - 1))
 
 
 def test_the_clock_starts_again_with_every_episode():
