@@ -165,24 +165,8 @@ def statements(source: str, label: str = "another cell") -> list[Statement]:
     return [Statement(node, label, flags) for node in tree.body]
 
 
-@functools.lru_cache(maxsize=200)
-def compiled(code: str, label: str) -> CodeType:
-    """Of ours, which is the same for a whole class."""
-    return compile(code, label, "exec")
-
-
-def prepare(job: dict) -> None:
-    """Compile what is ours of a job, see `define`, so that processes forked from here need not."""
-    compiled(PREAMBLE + job["given"], "given")
-    compiled(job["given"], "given")
-    compiled(job["probe"], "the check")
-    for source, course in (*job["helpers"], *job["below"]):
-        if course:
-            learn(source)
-
-
 def learn(source: str) -> None:
-    """Compile what a cell of the course defines."""
+    """Compile what a cell of the course defines, so that processes forked from here need not."""
     for statement in statements(source):
         if statement.quiet and not statement.stub:
             statement.code  # noqa: B018
@@ -218,8 +202,6 @@ class Cells:
         """Run a cell but for stubs, or only its definitions. Raises SyntaxError."""
         found = statements(source, label)
         self.failed, seconds = None, max(0.2, min(CELL, self.left))
-        for number, *_ in CLOCKS:
-            signal.signal(number, _stop)
         definitions_only |= self.definitions_only or self.left <= 0
         before = time.process_time()
         for statement in found:
@@ -269,29 +251,27 @@ def execute(code: CodeType, names: dict) -> None:
             awaits.send(None)
 
 
-# (what it sends, the clock, how many times the limit). Where the system has no such clocks, on
-# Windows, students run their own cells, without a limit.
-CLOCKS = (
-    ((signal.SIGPROF, signal.ITIMER_PROF, 1), (signal.SIGALRM, signal.ITIMER_REAL, 5))
-    if hasattr(signal, "setitimer")
-    else ()
-)
-
-
-def _stop(*_):
-    raise TooLong
-
-
 @contextlib.contextmanager
 def within(seconds: float):
-    """Raise TooLong in a block that takes more processor time, or five times as long asleep, where
-    `_stop` hears the clocks."""
-    for _, clock, times in CLOCKS:
+    """Raise TooLong in a block that takes more processor time, or five times as long asleep.
+
+    Where the system has no such clocks, on Windows, students run their own cells, without a limit.
+    """
+    if not hasattr(signal, "setitimer"):
+        yield
+        return
+
+    def stop(*_):
+        raise TooLong
+
+    clocks = ((signal.SIGPROF, signal.ITIMER_PROF, 1), (signal.SIGALRM, signal.ITIMER_REAL, 5))
+    for number, clock, times in clocks:
+        signal.signal(number, stop)
         signal.setitimer(clock, times * seconds)
     try:
         yield
     finally:
-        for _, clock, _ in CLOCKS:
+        for _, clock, _ in clocks:
             signal.setitimer(clock, 0)
 
 
@@ -303,7 +283,7 @@ def define(job: dict) -> Cells:
     over, whether it also replaces what the student has written by these names.
     """
     names = {"__name__": "__main__", "get_ipython": Shell, "display": print, "check": Shell().check}
-    exec(compiled(PREAMBLE + job["given"], "given"), names)
+    exec(compile(PREAMBLE + job["given"], "given", "exec"), names)
     cells = Cells(names, job["definitions_only"])
     cells.others(job["helpers"])
     lines = job["source"].splitlines(keepends=True)
@@ -316,7 +296,7 @@ def define(job: dict) -> Cells:
     if job["name"] not in names:
         raise failed or NameError(f"this cell does not define {job['name']}")
     if job["over"]:
-        exec(compiled(job["given"], "given"), names)
+        exec(compile(job["given"], "given", "exec"), names)
     return cells
 
 
@@ -352,12 +332,11 @@ def state(x) -> dict:
     """What an answer has to leave as it is of an argument, by kinds: numbers, whether tensors in
     it have a gradient, a network's mode, and gradients that have been summed up."""
     found = list(_tensors(x))
-    parts = found if hasattr(x, "requires_grad") else (x, *found)
     return {
-        "values": [wire.encode(part) for part in parts],
+        "values": [wire.encode(part) for part in (x, *found)],
         "graph": [(t.requires_grad, t.is_leaf) for t in found],
         "mode": [part.training for part in x.modules()] if hasattr(x, "modules") else [],
-        "grad": [t.is_leaf and t.grad is not None and wire.encode(t.grad) for t in found],
+        "grad": [wire.encode(t.grad if t.is_leaf else None) for t in found],
     }
 
 
@@ -381,7 +360,7 @@ def watch(names: dict, job: dict) -> Watched:
     watched = Watched(names[job["name"]], job["changes"])
     if not isinstance(watched.function, type):
         names[job["name"]] = watched
-    exec(compiled(job["probe"], "the check"), names)
+    exec(compile(job["probe"], "the check", "exec"), names)
     return watched
 
 

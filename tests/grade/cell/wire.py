@@ -27,7 +27,6 @@ DTYPES = {
 LONG = {"g": "f8", "G": "c16"}  # of as many bits as a processor likes
 RAISED = {"raised": 100, "text": 1000, "line": 200}  # characters of each
 KEYS = (str, int, bool, type(None))  # of a dict; numbers of other kinds can share one hash
-FLOATS, LISTS = (Fraction, Decimal, float), (list, range, deque)  # what passes as one of these
 
 
 class Garbage(ValueError):
@@ -69,21 +68,19 @@ def encode(value) -> bytes:
         if deep > DEEPEST:
             return {"other": "a list of lists without end"}
         kind = type(x)
-        if kind is np.ndarray:  # what is asked below takes longer than to copy most of them
-            return numbers(x, False, kind)
         if x is None or kind is bool:
             return {"v": x}
         if isinstance(x, str) and kind is not Other and kind is not Raised:
             return {"v": str.__str__(x)}  # of np.str_ and the like, too
         if kind is int or (isinstance(x, int) and not isinstance(x, np.generic)):
             return {"int": str(int(x))} if abs(x) < LARGEST else {"other": "a huge int"}
-        if isinstance(x, FLOATS) and not isinstance(x, np.generic):
+        if isinstance(x, Fraction | Decimal | float) and not isinstance(x, np.generic):
             x, kind = float(x), float
         if kind is float:
             return {"float": x.hex() if math.isfinite(x) else repr(x)}
         if isinstance(x, tuple):  # a namedtuple, too
             return {"tuple": [pack(item, deep + 1) for item in tuple(x)]}
-        if isinstance(x, LISTS):
+        if isinstance(x, list | range | deque):
             return {"list": [pack(item, deep + 1) for item in list(x)]}
         if isinstance(x, dict):
             return {"dict": [[pack(k, deep + 1), pack(v, deep + 1)] for k, v in dict(x).items()]}
@@ -102,19 +99,16 @@ def encode(value) -> bytes:
             x = np.asarray(x)
         if hasattr(x, "__array__") and type(x) is not np.ndarray and not isinstance(x, type):
             x = np.asarray(x)  # another library's array
-        return numbers(x, tensor, kind) if type(x) is np.ndarray else {"other": kind.__name__}
-
-    def numbers(x, tensor, kind):
-        if x.dtype == object:
+        if type(x) is np.ndarray and x.dtype == object:
             x = as_numbers(x)
-        if x.dtype.char in LONG:
+        if type(x) is np.ndarray and x.dtype.char in LONG:
             x = x.astype(LONG[x.dtype.char])
-        if x.dtype.str[1:] not in DTYPES:
-            return {"other": kind.__name__}
-        if not x.dtype.isnative:
-            x = x.astype(x.dtype.newbyteorder("="))
-        buffers.append(x.tobytes())  # in C's order, whatever its strides are
-        return {"array": x.dtype.str[1:], "shape": list(x.shape), "kind": tensor}
+        if type(x) is np.ndarray and x.dtype.str[1:] in DTYPES:
+            # A fresh contiguous copy, so that views and odd strides pass.
+            x = np.array(x, order="C", dtype=x.dtype.newbyteorder("="))
+            buffers.append(x.tobytes())
+            return {"array": x.dtype.str[1:], "shape": list(x.shape), "kind": tensor}
+        return {"other": kind.__name__}
 
     header = json.dumps(pack(value, 0)).encode()
     return b"".join([struct.pack("<Q", len(header)), header, *buffers])

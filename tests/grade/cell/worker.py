@@ -95,7 +95,9 @@ def main(fd: int, readable: list[str]) -> None:
             job = wire.decode(wire.receive(control))
         except EOFError:
             return
-        answer.prepare(job)
+        for source, course in (*job["helpers"], *job["below"]):
+            if course:
+                answer.learn(source)
         theirs, ours = socket.socketpair()
         below, above = socket.socketpair()
         socket.send_fds(control, [b"."], [theirs.fileno()])
