@@ -22,6 +22,7 @@ ROOT = Path(__file__).resolve().parents[1]
 CODE = ("lbw_minimal", "notebooks", "tasks", "tests")  # of the kit, with the videos: 7 MB
 KIT = (*CODE, "solutions")  # with the weights: 30 MB
 LEAN = Path(__file__).with_name("lean")  # for the path of Ray's processes: see what lies there
+INTERRUPTED = 130  # exit code: 128 and the signal's number
 RETRIES = 3  # new starts of a job whose worker or node was lost
 # Python that dies with its parent (prctl 1, PR_SET_PDEATHSIG): nobody would end it on a lost node.
 MORTAL = (
@@ -64,10 +65,14 @@ def ahead(kit: tuple[str, ...], rest: Callable[[], Any]) -> None:
 
     What fails is left for the next `connect` to say, and for who needs the rest.
     """
-    with contextlib.suppress(Exception), ThreadPoolExecutor(1) as aside:
-        _ray()
-        aside.submit(rest)
-        connect(kit)
+    try:
+        with contextlib.suppress(Exception), ThreadPoolExecutor(1) as aside:
+            _ray()
+            aside.submit(rest)
+            connect(kit)
+    except KeyboardInterrupt:
+        print("interrupted", file=sys.stderr)
+        sys.exit(INTERRUPTED)
 
 
 def _ray() -> Any:

@@ -19,7 +19,7 @@ from lbw_minimal import cluster
 from lbw_minimal.training import InputError
 from tasks.__main__ import main
 from tasks.commands import batch, table
-from tests.grade import sandbox
+from tests.grade import arguments, sandbox
 from tests.grade.__main__ import main as grade
 from tests.grade.cluster import grade_here
 from tests.grade.files import File
@@ -155,7 +155,7 @@ def test_a_line_of_print_is_a_command_of_the_kit(tmp_path, capsys):
 
 
 def test_what_starts_ray_and_what_a_cluster_calls_to_run_a_command_does_without_torch():
-    code = "import sys, lbw_minimal.cluster, tests.grade; sys.exit('torch' in sys.modules)"
+    code = "import sys, tests.grade.arguments; sys.exit('torch' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], cwd=ROOT).returncode == 0
 
 
@@ -170,6 +170,29 @@ def test_ray_starts_while_the_rest_is_done_and_may_fail_until_it_is_needed(monke
     monkeypatch.setattr(cluster, "_ray", lambda: None)
     cluster.ahead(cluster.CODE, begun.set)
     assert started == [(cluster.CODE, True, threading.main_thread())]
+
+
+def test_an_interrupt_while_ray_starts_ends_without_a_traceback(monkeypatch, capsys):
+    def connect(kit):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(cluster, "connect", connect)
+    monkeypatch.setattr(cluster, "_ray", lambda: None)
+    with pytest.raises(SystemExit) as end:
+        cluster.ahead(cluster.CODE, lambda: None)
+    assert (end.value.code, capsys.readouterr().err) == (130, "interrupted\n")
+
+
+@pytest.mark.parametrize(("more", "begun"), [(["--ray"], True), ([], False)])
+def test_ray_is_started_if_it_is_asked_for_and_there_is_a_class(more, begun, tmp_path, monkeypatch):
+    started = []
+    monkeypatch.setattr(cluster, "ahead", lambda kit, rest: started.append(kit))
+    monkeypatch.setattr(sys, "argv", ["grade", str(tmp_path / "nothing"), *more])
+    arguments.start_ray()
+    assert not started
+    monkeypatch.setattr(sys, "argv", ["grade", str(tmp_path), *more])
+    arguments.start_ray()
+    assert bool(started) is begun
 
 
 @pytest.fixture

@@ -8,7 +8,6 @@ Gradescope's results.json. What is finished is not graded again unless it or the
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import functools
 import hashlib
@@ -22,13 +21,13 @@ import time
 import traceback
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict
-from importlib import import_module
 from pathlib import Path
 
 from lbw_minimal import cluster
+from tests.grade import arguments
 
-if __name__ == "__main__" and "--ray" in sys.argv:  # what is imported below takes a second or two
-    cluster.ahead(cluster.CODE, lambda: import_module("tests.grade.exercise").everything())
+if __name__ == "__main__":  # Ray starts while what is imported below is read, which takes as long
+    arguments.start_ray()
 
 from lbw_minimal.training import InputError, write_atomic
 from tests.grade import feedback, sandbox
@@ -48,7 +47,7 @@ SEED = 2  # of one submission alone; students check themselves with 0
 def main(argv=None) -> int:
     """Returns the exit code: 2 where there is nothing to grade, 1 if the grader failed on a
     submission or could not write, 130 if it was interrupted."""
-    args = _arguments(argv)
+    args = arguments.read(argv)
     if not (args.ray or sandbox.holds()):
         say(f"error: {sandbox.ELSEWHERE}", sys.stderr)
         return 2
@@ -119,33 +118,6 @@ def noted_seed(out: Path, given: int | None) -> int:
     noted = keep(path, f"{given}\n")
     say(f"seed of the inputs: {given}{f', noted in {path}' if noted else ''}")
     return given
-
-
-def _arguments(argv) -> argparse.Namespace:
-    parser = argparse.ArgumentParser(
-        prog="python -m tests.grade", description=__doc__.split("\n")[0]
-    )
-    parser.add_argument("folder", type=Path, help="submissions: one folder or one notebook each")
-    parser.add_argument("--one", action="store_true", help="the folder is a single submission")
-    parser.add_argument("--out", type=Path, default=Path("grades"))
-    parser.add_argument(
-        "--notebooks",
-        help="numbers of those that were set, such as 5 or 5,6; default: what most handed in",
-    )
-    parser.add_argument(
-        "--seed", type=int, help="of the inputs, to repeat a grading; by default a new one is drawn"
-    )
-    how = parser.add_mutually_exclusive_group()
-    jobs = {"type": int, "choices": range(1, 65), "default": 2, "metavar": "N"}
-    how.add_argument("-j", "--jobs", **jobs, help="submissions at a time")
-    how.add_argument("--ray", action="store_true", help="grade on a Ray cluster")
-    parser.add_argument(
-        "--gradescope", action="store_true", help="write results.json for Gradescope, too"
-    )
-    parser.add_argument(
-        "--require-bubblewrap", action="store_true", help="stop where bubblewrap does not start"
-    )
-    return parser.parse_args(argv)
 
 
 def say(text: object, where=None) -> None:
