@@ -11,7 +11,7 @@ from zipfile import ZipFile
 import numpy as np
 import pytest
 
-from tests.grade import alike, items, trees
+from tests.grade import alike, feedback, items, trees
 from tests.grade.__main__ import main
 from tests.grade.cell.answer import STUB
 from tests.grade.exercise import find
@@ -19,6 +19,7 @@ from tests.grade.files import RELEASED
 from tests.grade.handed_in import Submission
 from tests.grade.reports import reports
 from tests.grade.sheets import sheet
+from tests.grade.webpage import words
 from tests.test_grading_files import notebook
 
 pytestmark = pytest.mark.usefixtures("workers_wait")
@@ -125,6 +126,13 @@ def test_who_tried_nothing_and_who_could_not_be_graded_do_not_count():
     assert item.answers == 1 and item.failed == []
     assert "2 more" in items.items_page([item], 2)
     assert items.statistics(grades[1:], ["6.1"]) == [] and items.items_page([], 2)
+
+
+def test_what_stands_between_backticks_is_code_and_nothing_becomes_a_tag():
+    assert words("1 < `x > 0` `") == "1 &lt; <code>x &gt; 0</code> `"
+    grades = [record(f"s{i}", exercise("6.1", 0, "`a` is missing", "`b`")) for i in range(3)]
+    shown = items.items_page(items.statistics(grades, ["6.1"]), 0) + feedback.page(grades[0])
+    assert "`" not in shown
 
 
 def test_a_name_becomes_neither_a_formula_nor_a_tag():

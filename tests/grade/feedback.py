@@ -6,7 +6,7 @@ from html import escape
 from xml.etree import ElementTree
 
 from tests.grade.judge import TRY, Outcome, Result
-from tests.grade.webpage import webpage
+from tests.grade.webpage import webpage, words
 
 
 def result(e: dict) -> Result:
@@ -23,10 +23,10 @@ def page(done: dict) -> str:
         for o in e["outcomes"]:
             new = o["message"] and o["message"] not in said
             said.add(o["message"])
-            hint = f'<span class="hint">{escape(o["message"])}</span>' if new else ""
+            hint = f'<span class="hint">{words(o["message"])}</span>' if new else ""
             state = "wrong" if o["message"] else "ok"
             mark = f"{o['points']:g}/{o['most']:g}"
-            items.append(f'<li class="{state}">{mark} {escape(o["label"])}{hint}</li>')
+            items.append(f'<li class="{state}">{mark} {words(o["label"])}{hint}</li>')
         points = f'<span class="points">{e["points"]:g} / {e["most"]:g}</span>'
         head = f"<h2>{points}{e['id']} {escape(e['title'])}</h2>"
         paste = f"<p>{TRY}</p><pre>{escape(e['example'])}</pre>" if e["example"] else ""

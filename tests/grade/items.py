@@ -16,7 +16,7 @@ import numpy as np
 
 from tests.grade.exercise import everything
 from tests.grade.sheets import sheet
-from tests.grade.webpage import table, webpage
+from tests.grade.webpage import table, webpage, words
 
 SURE = 1.96  # standard errors to either side of a 95 % interval
 
@@ -165,10 +165,10 @@ def _rest(i: Item) -> str:
 
 
 def _details(i: Item) -> str:
-    hints = [f"<li>{times} × {escape(hint)}</li>" for hint, times in i.hints.most_common()]
+    hints = [f"<li>{times} × {words(hint)}</li>" for hint, times in i.hints.most_common()]
     if i.unexplained:
         hints.append(f"<li>{i.unexplained} × wrong, and no hint</li>")
-    checks = [f"<li>{times} × {escape(label)}</li>" for label, times in i.checks.most_common()]
+    checks = [f"<li>{times} × {words(label)}</li>" for label, times in i.checks.most_common()]
     who = ", ".join(map(escape, i.failed)) or "nobody"
     return (
         f'<h2 id="e{i.id}">{i.id} {escape(i.title)}</h2>'

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from html import escape
 
 CSS = """
@@ -32,6 +33,11 @@ details { margin: .4em 0 } summary { cursor: pointer }
   tr, pre { break-inside: avoid }
 }
 """
+
+
+def words(text: str) -> str:
+    """Text as HTML, with what stands between backticks as code."""
+    return re.sub(r"`([^`\n]+)`", r"<code>\1</code>", escape(text))
 
 
 def webpage(title: str, body: str) -> str:
