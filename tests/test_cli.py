@@ -232,6 +232,14 @@ PARSERS = {parser.command: parser for parser in commands.parsers()}
 OPTIONS = sorted(set().union(*(parser.options() for parser in PARSERS.values())) - {"-h", "--help"})
 
 
+@pytest.mark.parametrize("command", PARSERS)
+def test_help_names_the_defaults_there_are(command):
+    text = " ".join(PARSERS[command].format_help().split())
+    assert "(default: None)" not in text and "(default: [])" not in text
+    if command == "push":
+        assert "seed" in text and "(default: 0)" in text
+
+
 @pytest.mark.parametrize("option", OPTIONS)
 @pytest.mark.parametrize("command", PARSERS)
 def test_every_option_is_a_commands_own_or_refused_with_the_name_of_its_command(command, option):

@@ -60,7 +60,8 @@ def test_a_clip_becomes_a_human_video_that_the_kit_takes_as_its_own(filmed, eyes
     assert main(["prepare", "push", str(filmed[0]), "--out", str(tmp_path)]) == 0
     out = capfd.readouterr().out
     film = tmp_path / "reenactment.mp4"
-    assert out.startswith("usable\npage: ") and out.endswith(f"push --video {film}\n")
+    assert out.startswith("usable\npage: ")
+    assert out.endswith(f"push --video {film} --out 'runs/push-my push'\n")
     page = (tmp_path / "prepare.html").read_text()
     for part in ("Push: usable", "mirrored", "What was found", "in the scene", "--tip X,Y@S"):
         assert part in page
@@ -136,9 +137,14 @@ def test_marks_in_the_clips_pixels_and_seconds_do_what_a_detector_does(filmed, e
     np.testing.assert_allclose(marked.tip, seen.tip, atol=1e-9)
 
 
-def test_a_mark_outside_of_the_picture_is_named(filmed, eyes):
-    clip = prepare.prepare("push", filmed[0], Choices(tip=((1348.0, 418.0, 0.3),)))
-    assert clip.why_not.startswith("1348,418@0.3 is outside of 252x252 pixels")
+def test_a_mark_outside_of_the_picture_is_named(filmed, eyes, tmp_path):
+    """A mistake of the command: the page that the user clicks into stays."""
+    page = tmp_path / prepare.PAGE
+    page.write_text("before")
+    argv = ["push", str(filmed[0]), "--tip", "1348,418@0.3", "--out", str(tmp_path)]
+    with pytest.raises(InputError, match=r"^1348,418@0\.3 is outside of 252x252 pixels"):
+        prepare.main(argv)
+    assert page.read_text() == "before"
 
 
 def test_the_user_decides_which_seconds_count_and_what_is_mirrored(filmed, eyes, scene):
@@ -255,7 +261,7 @@ def test_what_was_found_is_laid_by_the_clips_shorter_side_cuts_and_marks(monkeyp
     assert result.warnings == ["cut at [4]"] and result.tracks is tracks
     assert result.notes[0].startswith("6 frames at 20 a second")
     for wrong in ((161.0, 20.0, 2.1), (10.0, 91.0, 2.1), (10.0, 20.0, 1.9), (10.0, 20.0, 2.3)):
-        with pytest.raises(Unusable, match=r"is outside of 160x90 pixels and 2\.0 to 2\.2 s"):
+        with pytest.raises(prepare.Misplaced, match=r"of 160x90 pixels and 2\.0 to 2\.2 s"):
             follow(Prepared(clip, "scene"), Choices(tip=(wrong,)))
 
 

@@ -56,6 +56,9 @@ def write(folder):
     )  # fmt: skip
 
 
+END = '[...document.querySelectorAll("section")].at(-1).innerText.split("\\n")'
+
+
 async def look(folder):
     """The page before a click, after each, and after each button."""
     states = {}
@@ -84,11 +87,10 @@ async def look(folder):
             night = [{"name": "prefers-color-scheme", "value": theme}]
             await page.call("Emulation.setEmulatedMedia", features=night)
             states[width, theme] = await page.js(AUDIT)
+        states["clicked end"] = await page.js(END)
         await page.js('document.getElementById("again").click()')
         states["none"] = await page.js(STATE)
-        states["end"] = await page.js(
-            '[...document.querySelectorAll("section")].at(-1).innerText.split("\\n")'
-        )
+        states["end"] = await page.js(END)
     return states
 
 
@@ -132,6 +134,11 @@ def test_the_command_is_copied_and_the_clicks_can_be_taken_back(seen):
 
 def test_the_page_ends_with_what_comes_next(seen):
     assert seen["end"][0] == "Next" and seen["end"][-1] == LEARN
+    assert not any("corrected" in line for line in seen["end"])
+
+
+def test_after_a_click_the_corrected_command_comes_first(seen):
+    assert any("corrected command above first" in line for line in seen["clicked end"])
 
 
 @pytest.mark.parametrize("how", [(WIDE, "light"), (PHONE, "light"), (WIDE, "dark")])

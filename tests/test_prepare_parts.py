@@ -50,7 +50,7 @@ def test_a_usable_clip_is_told_with_its_warnings_and_how_to_learn_from_it(
     command = (
         f"python -m tasks prepare push '{file}' --from 1 --tip 3,4@1.5 --no-mirror --out {out}"
     )
-    learn = f"python -m tasks push --video {out / 'reenactment.mp4'}"
+    learn = f"python -m tasks push --video {out / 'reenactment.mp4'} --out 'runs/push-my clip'"
     assert asked == [("push", file, choices), ("push", result, command, learn)]
     assert capsys.readouterr().out.splitlines() == [
         "usable, with 2 warnings", f"page: {out / 'page'}", "warning: It is dark.",
@@ -121,7 +121,7 @@ def test_a_mark_lies_in_the_picture_and_in_the_clips_seconds(mark, inside, monke
         if inside:
             assert follow(result, choices) == "laid"
         else:
-            with pytest.raises(Unusable, match="is outside of 160x90 pixels and"):
+            with pytest.raises(prepare.Misplaced, match="is outside of 160x90 pixels and"):
                 follow(result, choices)
 
 

@@ -37,7 +37,7 @@ WIDE = 360  # pixels, the longer side of a frame of the clip
 FRAMES = 12  # of the clip that the page shows
 TIP, OBJECT = (213, 94, 0), (86, 180, 233)  # Okabe and Ito's vermilion and sky blue
 STRIP = """
-.clip { display: grid; grid-template-columns: repeat(auto-fill, minmax(11rem, 1fr)); gap: .6rem }
+.clip { display: grid; grid-template-columns: repeat(auto-fill, minmax(15rem, 1fr)); gap: .6rem }
 .clip figure { margin: 0 }
 .clip img { width: 100%; display: block; cursor: crosshair }
 .clip .unused img { filter: grayscale(1) opacity(.4) }
@@ -58,10 +58,9 @@ def _dot(colour, hollow=False):
 
 
 LEGEND = f"""
-<p>{_dot(TIP)} Orange is the tip of the hand, {_dot(OBJECT)} sky blue the object. A full dot was
-surely found, a hollow one {_dot(TIP, True)} {_dot(OBJECT, True)} was not. The tip is the foremost
-point of the hand, or of a tool in it, that touches the object, also where the hand holds or covers
-it. Grey pictures are not used.</p>
+<p>{_dot(TIP)} Orange is the tip, the point that pushes: a fingertip, or the foot or end of what the
+hand holds. {_dot(OBJECT)} Sky blue is the object, the thing that is pushed. A full dot was surely
+found, a hollow one {_dot(TIP, True)} {_dot(OBJECT, True)} was not. Grey pictures are not used.</p>
 """
 CLICK = f"""
 <p>Is a dot wrong? Choose which, click where it should be, and run the command below. Another click
@@ -81,6 +80,7 @@ const [pre, copy, again] = ["command", "copy", "again"].map(id => document.getEl
 const show = () => {
   pre.textContent = [base, ...[...marks.values()].map(mark => mark.option)].join(" ");
   copy.textContent = "Copy";
+  document.getElementById("first")?.toggleAttribute("hidden", !marks.size);
 };
 document.querySelectorAll(".clip img").forEach(img => img.addEventListener("click", e => {
   const what = document.querySelector("[name=what]:checked").value;
@@ -112,10 +112,14 @@ OPTIONS = [
     ("--mirror, --no-mirror", "turn left into right, or do not"),
     (
         "--tip X,Y@S",
-        "the tip of the hand is at these pixels, of the pictures above, at that second",
+        "the tip, the point that pushes, is at these pixels of the clip at that second",
     ),
     ("--object X,Y@S", "and the object at these"),
 ]
+FIRST = """
+<p id="first" class="note" hidden>Run the corrected command above first: this one learns the motion
+as it is now.</p>
+"""
 SCENE = """
 <p>The clip's motion in the task's scene, in centimetres, as the simulated human was asked to do it
 (dashed) and did it (solid). Contact and arrival are the two grey lines. Before the clip's hand
@@ -184,7 +188,7 @@ def write_page(
     again = f"<pre>{escape(command)}</pre>" if tracks is None else ""
     page += section("To decide otherwise", table(OPTIONS), again)
     if learn:
-        page += section("Next", "<p>The robot learns it:</p>", f"<pre>{escape(learn)}</pre>")
+        page += section("Next", FIRST, "<p>The robot learns it:</p>", f"<pre>{escape(learn)}</pre>")
     title = f"{escape(task)}: a clip of one's own"
     body = "".join(page)
     write_atomic(path, HTML.format(title=title, css=CSS + STRIP, links=links, body=body))

@@ -36,6 +36,13 @@ COMMANDS = {  # each a file in this folder
 JITTER = 0.005  # m, start jitter, so that ten test episodes are ten different ones
 
 
+class Help(argparse.ArgumentDefaultsHelpFormatter):
+    """Names the defaults there are."""
+
+    def _get_help_string(self, action: argparse.Action) -> str | None:
+        return action.help if action.default in (None, []) else super()._get_help_string(action)
+
+
 class Parser(argparse.ArgumentParser):
     """The arguments of one command. A mistake raises InputError with a sentence that says more."""
 
@@ -44,7 +51,7 @@ class Parser(argparse.ArgumentParser):
             prog=f"python -m tasks {command}",
             description=description,
             allow_abbrev=False,
-            formatter_class=argparse.ArgumentDefaultsHelpFormatter,
+            formatter_class=Help,
         )
         self.command = command
 

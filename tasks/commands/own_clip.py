@@ -18,11 +18,6 @@ from tasks.commands.prepare import FILM, PAGE, STILLS, Prepared, write
 NAV = re.compile(r"<nav.*?</nav>\n", re.DOTALL)
 
 
-def folder(name: str, clip: Path | None) -> Path:
-    """Where a run of the task `name` writes by default: a clip's run keeps clear of the kit's."""
-    return Path("runs") / (f"{name}-{clip.stem}" if clip else name)
-
-
 def bring(out: Path, name: str, clip: Prepared, file: Path) -> None:
     """Put film, page and stills of the clip into the run's folder; file: what --video named."""
     page, stills = file.with_name(PAGE), file.with_name(STILLS)

@@ -49,6 +49,11 @@ WHERE = "as a click into the page writes it; may be given several times"
 Mark = tuple[float, float, float]  # x, y in pixels of the clip, s
 
 
+def folder(name: str, clip: Path | None) -> Path:
+    """Where a run of the task `name` writes by default: a clip's run keeps clear of the kit's."""
+    return Path("runs") / (f"{name}-{clip.stem}" if clip else name)
+
+
 def no_frames() -> np.ndarray:
     """A film (0, 84, 84, 3) of no frames."""
     return np.zeros((0, video.SIZE, video.SIZE, 3), np.uint8)
@@ -63,6 +68,10 @@ class Choices:
     mirror: bool | None = None
     tip: tuple[Mark, ...] = ()
     object: tuple[Mark, ...] = ()
+
+
+class Misplaced(InputError):
+    """A correction names a place or a second that the clip has not."""
 
 
 @dataclass
@@ -140,6 +149,8 @@ def main(argv: list[str]) -> int:
     out = args.out or Path("runs") / "prepare" / args.task
     try:
         result = prepare(args.task, args.file, choices)
+    except Misplaced:  # a mistake of the command, not the clip's: its page stays
+        raise
     except InputError as error:  # no picture to show
         print(f"not usable: {error}")
         return 2
@@ -147,7 +158,9 @@ def main(argv: list[str]) -> int:
     if result.why_not and args.file.resolve() != (out / FILM).resolve():
         for before in (FILM, STILLS):  # of another clip, which nobody is to learn from by mistake
             (out / before).unlink(missing_ok=True)
-    learn = shlex.join(["python", "-m", "tasks", args.task, "--video", str(out / FILM)])
+    # The film's name is every clip's; a run bears the clip's.
+    named = [] if args.file.name == FILM else ["--out", str(folder(args.task, args.file))]
+    learn = shlex.join(["python", "-m", "tasks", args.task, "--video", str(out / FILM), *named])
     command = shlex.join(["python", "-m", "tasks", "prepare", *argv])
     page = write(out, args.task, result, command, "" if result.why_not else learn)
     print(f"{result.verdict}\npage: {page}")
@@ -210,7 +223,7 @@ def usable(name: str, path: Path) -> Prepared:
 def follow(result: Prepared, choices: Choices) -> Motion:
     """Find tip and object in the clip, and lay their motion into the scene.
 
-    Raises Unusable if that cannot be done.
+    Raises Unusable if that cannot be done, and Misplaced.
     """
     clip, frames = result.clip, result.clip.frames
     height, width = frames.shape[1:3]
@@ -221,10 +234,10 @@ def follow(result: Prepared, choices: Choices) -> Motion:
     first, last = clip.times[0] - SLACK, clip.times[-1] + SLACK
     for x, y, s in (*choices.tip, *choices.object):
         if not (0 <= x <= width and 0 <= y <= height and first <= s <= last):
-            raise Unusable(
+            raise Misplaced(
                 f"{x:g},{y:g}@{s:g} is outside of {width}x{height} pixels and "
-                f"{clip.times[0]:.1f} to {clip.times[-1]:.1f} s",
-                "click into a frame of the page: it writes the place in the picture as it was read",
+                f"{clip.times[0]:.1f} to {clip.times[-1]:.1f} s; "
+                "click into a frame of the page: it writes the place in the picture as it was read."
             )
     seen = footage.check(frames, clip.cuts)
     frames = seen.frames
