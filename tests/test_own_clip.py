@@ -7,8 +7,8 @@ import numpy as np
 
 from lbw_minimal.clips.stills import read_stills, write_stills
 from tasks.commands import own_clip
+from tasks.commands.links import folder
 from tasks.commands.own_clip import bring
-from tasks.commands.prepare import folder
 
 
 def test_a_run_on_a_clip_keeps_clear_of_other_runs():

@@ -22,8 +22,9 @@ from lbw_minimal.imitate import Perception, Recipe, Run, load_perception
 from lbw_minimal.reward import MENDS
 from lbw_minimal.training import InputError, pick_device, write_atomic
 from tasks.commands import JITTER, Parser, at_least, make_folder, metres
+from tasks.commands.links import folder
 from tasks.commands.own_clip import bring
-from tasks.commands.prepare import FILM, PAGE, STILLS, folder, usable
+from tasks.commands.prepare import FILM, PAGE, STILLS, usable
 from tasks.commands.recipe import METHODS, PIXELS, fields_of, recipe_of
 from tasks.commands.record import EXPERTS
 

@@ -21,6 +21,11 @@ BESIDE = {
 }
 
 
+def folder(name: str, clip: Path | None) -> Path:
+    """Where a run of the task `name` writes by default: a clip's run keeps clear of the kit's."""
+    return RUNS / (f"{name}-{clip.stem}" if clip else name)
+
+
 def links(page: Path, runs: Path = RUNS) -> str:
     """A list of the kit's other pages, for a page that is written to the path `page`.
 

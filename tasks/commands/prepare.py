@@ -34,7 +34,7 @@ from lbw_minimal.pictures import spread
 from lbw_minimal.report import COLUMNS
 from lbw_minimal.training import InputError, write_atomic
 from tasks.commands import Parser, make_folder, within
-from tasks.commands.links import links
+from tasks.commands.links import folder, links
 from tasks.world.reenact import Reenactment, reenact
 
 FILM, PAGE = "reenactment.mp4", "prepare.html"
@@ -47,11 +47,6 @@ EYES = tasks.WEIGHTS / "eyes" / "eyes.safetensors"  # the detector of tip and ob
 WHERE = "as a click into the page writes it; may be given several times"
 
 Mark = tuple[float, float, float]  # x, y in pixels of the clip, s
-
-
-def folder(name: str, clip: Path | None) -> Path:
-    """Where a run of the task `name` writes by default: a clip's run keeps clear of the kit's."""
-    return Path("runs") / (f"{name}-{clip.stem}" if clip else name)
 
 
 def no_frames() -> np.ndarray:
