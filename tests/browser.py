@@ -63,7 +63,11 @@ async def opened(path, profile, *options):
                 break
             await asyncio.sleep(0.1)
         socket = await websocket_connect(pages[0]["webSocketDebuggerUrl"], max_message_size=2**28)
-        yield Page(socket)
+        page = Page(socket)
+        # A new browser shows an empty page, complete, until the file's takes its place.
+        there = f"location.pathname.endsWith('/{path.name}') && document.readyState"
+        await page.until(there, "complete")
+        yield page
     finally:
         process.kill()
         process.wait()

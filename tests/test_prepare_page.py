@@ -65,7 +65,6 @@ async def look(folder):
     async with browser.opened(
         folder / "prepare.html", folder / "profile", "--hide-scrollbars"
     ) as page:
-        await page.until("document.readyState", "complete")
         await page.js('addEventListener("copy", () => window.copied = getSelection().toString())')
         await page.js(f"document.head.insertAdjacentHTML('beforeend', `<style>{WHOLE}</style>`)")
         states["first"] = await page.js(STATE)
