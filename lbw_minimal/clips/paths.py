@@ -277,10 +277,15 @@ def ends(path: np.ndarray, least: float, what: str) -> tuple[np.ndarray, np.ndar
     away = np.linalg.norm(path - path[0], axis=1)
     far = int(np.argmax(away))
     if away[far] < least:
-        raise Unusable(f"the {what} never moves, or by {away[far]:.0f} pixels only", NEARER)
+        raise never_moves(what, away[far])
     moving = int(np.argmax(away > 2 * RESTS * away[far]))
     there = np.linalg.norm(path - path[far], axis=1) < RESTS * away[far]
     return np.median(path[:moving], axis=0), np.median(path[there], axis=0)
+
+
+def never_moves(what: str, gone: float) -> Unusable:
+    """The error for a hand or object, `what`, that has gone too few pixels."""
+    return Unusable(f"the {what} never moves, or by {gone:.0f} pixels only", NEARER)
 
 
 def progress(path: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:

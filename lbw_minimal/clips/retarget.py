@@ -17,7 +17,6 @@ import numpy as np
 from lbw_minimal.clips.paths import (
     FOUND,
     LEAST_WAY,
-    NEARER,
     REST,
     RESTS,
     STANDS,
@@ -27,6 +26,7 @@ from lbw_minimal.clips.paths import (
     interpolate,
     longest_piece,
     low_pass,
+    never_moves,
     of_a_hand,
     progress,
     trusted,
@@ -110,7 +110,7 @@ def lay(tracks: Tracks, scene: Scene, mirror: bool | None = None) -> Motion:
             )
         warnings.append(f"The clip ends while the {what} still gets faster: was it not done yet?")
     if gone < LEAST_WAY * tracks.side:
-        raise Unusable(f"the {what} never moves, or by {gone:.0f} pixels only", NEARER)
+        raise never_moves(what, gone)
     if mirror is None:
         mirror = bool(end[0] < start[0])
         if mirror:

@@ -80,7 +80,7 @@ def main(argv=None) -> int:
         return 2
     except KeyboardInterrupt:
         say("interrupted; the same command goes on where this one was", sys.stderr)
-        return 130
+        return cluster.INTERRUPTED
     with ThreadPoolExecutor(1) as aside:  # to end Ray takes as long as to write the reports
         if args.ray:
             aside.submit(cluster.leave)
