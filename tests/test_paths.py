@@ -267,8 +267,11 @@ def test_a_correction_does_not_go_beyond_a_cut():
     marked = whole.marked("tip", [(20.0, 50.0, 0.7)])
     np.testing.assert_allclose(marked.tip[7:10, 0], [20, 18, 16])
     assert (marked.tip[10:] == whole.tip[10:]).all() and (marked.tip_sure[10:] == 0.8).all()
+    assert [i for i in range(20) if marked.is_yours("tip", i)] == [7]
     both = whole.marked("tip", [(20.0, 50.0, 0.7), (70.0, 50.0, 1.3)])
     np.testing.assert_allclose(both.tip[7:14, 0], [20, 18, 16, 58, 62, 66, 70])
+    assert [i for i in range(20) if both.is_yours("tip", i)] == [7, 13]
+    assert not any(both.is_yours("object", i) for i in range(20))
 
 
 def test_marks_alone_make_the_path_where_nothing_was_found():

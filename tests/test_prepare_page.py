@@ -5,8 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from lbw_minimal.clips.page import clip_frames, write_page
+from lbw_minimal.clips.page import write_page
 from lbw_minimal.clips.paths import Tracks
+from lbw_minimal.clips.shots import clip_frames
 from tests import browser
 from tests.test_pages import AUDIT, FINE, PHONE, WIDE
 
@@ -48,14 +49,18 @@ def clip():
 
 
 def write(folder):
+    """The page of a usable clip, and of one in which nothing was looked for."""
     frames, times, tracks = clip()
+    common = {"task": "push", "command": COMMAND, "frames": frames, "times": times,
+              "scene": SimpleNamespace(), "notes": ["It was dark."]}  # fmt: skip
     write_page(
-        folder / "prepare.html", task="push", command=COMMAND, verdict="usable, with a warning",
-        frames=frames, times=times, scene=SimpleNamespace(), notes=["It was dark."],
-        warnings=["The clip jumps once."], tracks=tracks, learn=LEARN,
+        folder / "prepare.html", verdict="usable, with a warning", tracks=tracks, learn=LEARN,
+        warnings=["The clip jumps once."], **common,
     )  # fmt: skip
+    write_page(folder / "not.html", verdict="not usable: no arm is seen.", warnings=[], **common)
 
 
+CHOICES = "[...document.querySelectorAll('[name=what]')].map(e => e.value + +e.checked)"
 END = '[...document.querySelectorAll("section")].at(-1).innerText.split("\\n")'
 
 
@@ -90,6 +95,15 @@ async def look(folder):
         await page.js('document.getElementById("again").click()')
         states["none"] = await page.js(STATE)
         states["end"] = await page.js(END)
+        for click in ("'from', 1, 0.5, 0.5", "'to', 9, 0.5, 0.5", "'to', 8, 0.2, 0.5"):
+            await page.js(f"({CLICK})({click})")
+        states["cut"] = await page.js(STATE)
+        await page.call("Page.navigate", url=(folder / "not.html").as_uri())
+        there = "location.pathname.endsWith('/not.html') && document.readyState"
+        await page.until(there, "complete")
+        states["not usable"] = await page.js(AUDIT), await page.js(CHOICES)
+        await page.js(f"({CLICK})('from', 3, 0.5, 0.5)")
+        states["not usable, cut"] = await page.js(STATE)
     return states
 
 
@@ -126,6 +140,21 @@ def test_clicks_for_both_things_and_into_several_frames_add_up(seen):
     assert places(seen["edge"])[-1] == ("0.700", TIP, 1, 0)
 
 
+def test_a_click_can_choose_the_first_and_the_last_picture_to_use(seen):
+    """There the picture counts and not the place in it, so another picture replaces the first."""
+    assert seen["cut"]["command"] == f"{COMMAND} --from 0.100 --to 0.800"
+    assert [when for when, *_ in seen["cut"]["dots"]] == ["0.100", "0.800"]
+
+
+def test_a_clip_that_was_not_searched_is_shown_and_can_be_cut(seen):
+    """Where tip and object are would be no help: it was the whole picture that was not usable."""
+    audit, choices = seen["not usable"]
+    assert audit == FINE and choices == ["from1", "to0"]
+    state = seen["not usable, cut"]
+    assert state["command"] == f"{COMMAND} --from 0.300"
+    assert [when for when, *_ in state["dots"]] == ["0.300"]
+
+
 def test_the_command_is_copied_and_the_clicks_can_be_taken_back(seen):
     assert seen["copied"] == (seen["edge"]["command"], "Copied")
     assert seen["none"] == seen["first"]
@@ -150,6 +179,15 @@ def test_pictures_outside_of_what_is_used_are_grey_and_say_so():
     grey = ["class=unused" in frame for frame in frames]
     assert grey == [not 3 <= i <= 8 for i in range(N)]
     assert ["; not used" in frame for frame in frames] == grey
-    assert "sure: tip 20%, object 100%" in frames[3] and not any(
-        "unused" in frame for frame in clip_frames(*clip(), (-np.inf, np.inf)).split("<figure")
-    )
+    assert "tip 20% sure, object 100% sure" in frames[3]
+    assert "unused" not in clip_frames(*clip())
+
+
+def test_what_the_user_placed_is_called_yours_and_no_share_of_certainty():
+    """Clicks at 0.3 and 0.5 s place the tip from there to there."""
+    frames, times, tracks = clip()
+    tracks = tracks.marked("tip", [(80, 100, 0.3), (120, 100, 0.5)])
+    shots = clip_frames(frames, times, tracks).split("<figure")[1:]
+    assert ["tip yours, object 100% sure" in shot for shot in shots] == [
+        3 <= i <= 5 for i in range(N)
+    ]

@@ -1,13 +1,12 @@
 """The page about a person's clip: what was found in it, what was done, and what came of it.
 
 In: the clip, the tracks found in it, their motion in the scene, the film of its re-enactment and
-what the shipped networks see in that. Out: one HTML file that needs no other file and no network. A
-click into one of its frames writes the option that corrects what was found there.
+what the shipped networks see in that. Out: one HTML file that needs no other file and no network.
+The pictures that a click corrects are those of `shots.py`.
 """
 
 from __future__ import annotations
 
-import json
 from html import escape
 from pathlib import Path
 
@@ -16,16 +15,15 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from lbw_minimal.clips.paths import FADE, SURE, Tracks
+from lbw_minimal.clips.paths import SURE, Tracks
 from lbw_minimal.clips.retarget import FPS, Motion, Scene
+from lbw_minimal.clips.shots import STRIP, drawn, to_correct
 from lbw_minimal.films import Film
 from lbw_minimal.pictures import (
     COLOURS,
     STYLE,
-    data_uri,
     draw_keypoints,
     picture,
-    spread,
     svg,
 )
 from lbw_minimal.report import section, table
@@ -33,80 +31,6 @@ from lbw_minimal.report_texts import CSS, HTML
 from lbw_minimal.training import write_atomic
 
 SCALE = 3  # of the film's pictures, 84 pixels wide
-WIDE = 360  # pixels, the longer side of a frame of the clip
-FRAMES = 12  # of the clip that the page shows
-TIP, OBJECT = (213, 94, 0), (86, 180, 233)  # Okabe and Ito's vermilion and sky blue
-STRIP = """
-.clip { display: grid; grid-template-columns: repeat(auto-fill, minmax(15rem, 1fr)); gap: .6rem }
-.clip figure { margin: 0 }
-.clip img { width: 100%; display: block; cursor: crosshair }
-.clip .unused img { filter: grayscale(1) opacity(.4) }
-.shot { display: block; position: relative }
-.click { position: absolute; width: 12px; height: 12px; margin: -6px; border: 2px solid #000;
-         border-radius: 50%; pointer-events: none }
-"""
-
-
-def _dot(colour, hollow=False):
-    """A dot of the legend, as HTML."""
-    ink = f"rgb{colour}"
-    fill = "none" if hollow else ink
-    return (
-        '<svg width="14" height="14" aria-hidden="true"><circle cx="7" cy="7" r="5" '
-        f'fill="{fill}" stroke="{ink}" stroke-width="2"/></svg>'
-    )
-
-
-LEGEND = f"""
-<p>{_dot(TIP)} Orange is the tip, the point that pushes: a fingertip, or the foot or end of what the
-hand holds. {_dot(OBJECT)} Sky blue is the object, the thing that is pushed. A full dot was surely
-found, a hollow one {_dot(TIP, True)} {_dot(OBJECT, True)} was not. Grey pictures are not used.</p>
-"""
-CLICK = f"""
-<p>Is a dot wrong? Choose which, click where it should be, and run the command below. Another click
-into the same picture replaces the first. Two or three pictures are enough: between your first and
-your last click the correction is interpolated. Beyond them it fades out: within {FADE:g} s where
-the dot was full, by the next full dot where it was hollow, and where the clip jumps. All else stays
-as it was found. So click also on a dot that is right, where a correction should end.</p>
-<p><label><input type="radio" name="what" value="tip" checked> {_dot(TIP)} tip</label>
-<label><input type="radio" name="what" value="object"> {_dot(OBJECT)} object</label></p>
-"""
-SCRIPT = """
-<pre id="command"></pre>
-<p><button id="copy">Copy</button> <button id="again">Start again</button></p>
-<script>
-const base = %s, colours = %s, marks = new Map();
-const [pre, copy, again] = ["command", "copy", "again"].map(id => document.getElementById(id));
-const show = () => {
-  pre.textContent = [base, ...[...marks.values()].map(mark => mark.option)].join(" ");
-  copy.textContent = "Copy";
-  document.getElementById("first")?.toggleAttribute("hidden", !marks.size);
-};
-document.querySelectorAll(".clip img").forEach(img => img.addEventListener("click", e => {
-  const what = document.querySelector("[name=what]:checked").value;
-  const box = img.getBoundingClientRect(), key = what + img.dataset.time;
-  const x = Math.min(1, Math.max(0, (e.clientX - box.left) / box.width));
-  const y = Math.min(1, Math.max(0, (e.clientY - box.top) / box.height));
-  const place = [x * img.dataset.width, y * img.dataset.height].map(v => v.toFixed(0));
-  const dot = marks.get(key)?.dot ?? document.createElement("i");
-  dot.className = "click";
-  dot.style = `left: ${100 * x}%%; top: ${100 * y}%%; background: ${colours[what]}`;
-  img.after(dot);
-  marks.set(key, {dot, option: `--${what} ${place}@${img.dataset.time}`});
-  show();
-}));
-again.addEventListener("click", () => {
-  marks.forEach(mark => mark.dot.remove());
-  marks.clear();
-  show();
-});
-copy.addEventListener("click", () => {  // the newer way asks for a secure page
-  getSelection().selectAllChildren(pre);
-  if (document.execCommand("copy")) copy.textContent = "Copied";
-});
-show();
-</script>
-"""
 OPTIONS = [
     ("--from S, --to S", "use only what is between these seconds of the clip"),
     ("--mirror, --no-mirror", "turn left into right, or do not"),
@@ -171,12 +95,12 @@ def write_page(
             SIDE_BY_SIDE,
             Film(films, _rate(shown) / 2).html(),
         )
+    clickable = tracks is not None or not columns  # nobody corrects a film taken as it is
+    if clickable:
+        used = None if motion is None else (motion.times[0], motion.times[-1])
+        title = "What was found in the clip" if tracks else "The clip"
+        page += section(title, *to_correct(frames, times, tracks, used, command))
     if tracks is not None:
-        colours = {"tip": f"rgb{TIP}", "object": f"rgb{OBJECT}"}
-        script = SCRIPT % (json.dumps(command).replace("<", "\\u003c"), json.dumps(colours))
-        used = (-np.inf, np.inf) if motion is None else (motion.times[0], motion.times[-1])
-        shots = clip_frames(frames, times, tracks, used)
-        page += section("What was found in the clip", LEGEND, CLICK, shots, script)
         page.append(picture(svg(confidence(tracks)), "How sure tip and object were found"))
     if notes:
         page += section(
@@ -185,8 +109,9 @@ def write_page(
     if motion is not None:
         figure = courses(motion, scene, states)
         page += section("The motion in the scene", SCENE, picture(svg(figure), "Paths over time"))
-    again = f"<pre>{escape(command)}</pre>" if tracks is None else ""
-    page += section("To decide otherwise", table(OPTIONS), again)
+    again = "" if clickable else f"<pre>{escape(command)}</pre>"
+    options = OPTIONS[: 1 if clickable and tracks is None else None]  # no other is of any help
+    page += section("To decide otherwise", table(options), again)
     if learn:
         page += section("Next", FIRST, "<p>The robot learns it:</p>", f"<pre>{escape(learn)}</pre>")
     title = f"{escape(task)}: a clip of one's own"
@@ -197,46 +122,6 @@ def write_page(
 def nearest(times: np.ndarray, t: float) -> int:
     """The index of the one of times (T,) that is nearest to t, all in s."""
     return int(np.abs(times - t).argmin())
-
-
-def clip_frames(
-    frames: np.ndarray, times: np.ndarray, tracks: Tracks, used: tuple[float, float]
-) -> str:
-    """Frames of the clip with tip and object drawn on them, which know where they are clicked.
-
-    used: the first and the last second that the motion shows; frames outside are grey.
-    """
-    figures, slack = [], 0.5 * float(np.median(np.diff(tracks.times)))
-    for i in spread(len(tracks.times), FRAMES):
-        t = tracks.times[i]
-        frame = frames[nearest(times, t)]
-        image = cv2.imencode(".webp", _drawn(frame, tracks, i)[..., ::-1])[1].tobytes()
-        size = f'data-width="{frame.shape[1]}" data-height="{frame.shape[0]}"'
-        inside = used[0] - slack <= t <= used[1] + slack
-        caption = f"{t:.2f} s; sure: tip {tracks.tip_sure[i]:.0%}, object "
-        caption += f"{tracks.object_sure[i]:.0%}" + ("" if inside else "; not used")
-        figures.append(
-            f'<figure{"" if inside else " class=unused"}><span class="shot">'
-            f'<img alt="Frame at {t:.2f} s" data-time="{t:.3f}" {size} '
-            f'src="{data_uri("image/webp", image)}"></span>'
-            f"<figcaption>{caption}</figcaption></figure>"
-        )
-    return f'<div class="clip">{"".join(figures)}</div>'
-
-
-def _drawn(frame, tracks=None, i=0):
-    """A frame at most WIDE pixels wide or high, with what was found at index i of the tracks."""
-    scale = WIDE / max(frame.shape[:2])
-    how = cv2.INTER_AREA if scale < 1 else cv2.INTER_CUBIC
-    small = cv2.resize(frame, None, fx=scale, fy=scale, interpolation=how)
-    if tracks is not None:
-        for name, paint in (("object", OBJECT), ("tip", TIP)):
-            x, y = (scale * getattr(tracks, name)[i]).tolist()
-            sure = getattr(tracks, f"{name}_sure")[i] >= SURE
-            at = round(16 * x), round(16 * y)
-            for radius, ink, wide in ((7, (255, 255, 255), -1), (5, paint, -1)):
-                cv2.circle(small, at, 16 * radius, ink, wide if sure else 2, cv2.LINE_AA, shift=4)
-    return small
 
 
 def clip_column(
@@ -257,7 +142,7 @@ def clip_column(
             t = motion.times[min(k, len(motion.times) - 1)]
             t += max(0, k + 1 - len(motion.times)) / FPS
         frame = frames[nearest(times, t)]
-        small = _drawn(frame, tracks, 0 if tracks is None else nearest(tracks.times, t))
+        small = drawn(frame, tracks, 0 if tracks is None else nearest(tracks.times, t))
         if motion is not None and motion.mirrored:
             small = small[:, ::-1]
         scale = S / max(small.shape[:2])

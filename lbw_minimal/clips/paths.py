@@ -53,12 +53,19 @@ class Tracks:
     cuts: tuple[int, ...] = ()  # frames at which the picture changes all at once
     enters: float = np.nan  # where the arm comes in, 0 at the left edge, 1 at the right
     unmoved: bool = False  # whether the last frames look as the first ones, but for the arm
+    # what the user placed: "tip" or "object", and from when to when, in s
+    yours: tuple[tuple[str, float, float], ...] = ()
 
     def part(self, first: int, last: int) -> Tracks:
         """Frames `first` to `last` - 1."""
         names = ("times", "tip", "object", "tip_sure", "object_sure")
         inside = tuple(c - first for c in self.cuts if first < c < last)
         return replace(self, cuts=inside, **{n: getattr(self, n)[first:last] for n in names})
+
+    def is_yours(self, name: str, i: int) -> bool:
+        """Whether the user's marks say where the tip or the object, `name`, is in frame i."""
+        t = self.times[i]
+        return any(name == what and first <= t <= last for what, first, last in self.yours)
 
     def marked(self, name: str, marks: list[tuple[float, float, float]]) -> Tracks:
         """The path `name`, "tip" or "object", moved so that it passes through marks (x, y, s).
@@ -73,6 +80,7 @@ class Tracks:
         path, sure = getattr(self, name).copy(), getattr(self, f"{name}_sure").copy()
         latest = {s: (x, y, s) for x, y, s in marks}
         frame = {s: int(np.abs(self.times - s).argmin()) for s in latest}
+        yours = list(self.yours)
         for first, last in pairwise([0, *_cuts(self), len(path)]):
             part = slice(first, last)
             inside = np.array([latest[s] for s in sorted(latest) if first <= frame[s] < last])
@@ -80,7 +88,9 @@ class Tracks:
                 path[part], sure[part] = _corrected(
                     self.times[part], path[part], sure[part], inside
                 )
-        return replace(self, **{name: path, f"{name}_sure": sure})
+                ends = (float(self.times[frame[s]]) for s in inside[[0, -1], 2])
+                yours.append((name, *ends))
+        return replace(self, yours=tuple(yours), **{name: path, f"{name}_sure": sure})
 
 
 def _corrected(t, found, own, marks):
