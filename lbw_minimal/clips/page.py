@@ -87,14 +87,7 @@ def write_page(
     page += [f'<p class="note">{escape(warning)}</p>' for warning in warnings]
     if columns and shown is not None:
         seen = clip_column(frames, times, tracks, motion, shown)
-        done, translated, z = columns
-        films = {"the clip": seen, "done again": done, "its translation": translated,
-                 "its keypoints": draw_keypoints(translated, z, SCALE)}  # fmt: skip
-        page += section(
-            "Clip, re-enactment, translation, keypoints",
-            SIDE_BY_SIDE,
-            Film(films, _rate(shown) / 2).html(),
-        )
+        page += _films(seen, *columns, _rate(shown) / 2)
     clickable = tracks is not None or not columns  # nobody corrects a film taken as it is
     if clickable:
         used = None if motion is None else (motion.times[0], motion.times[-1])
@@ -117,6 +110,14 @@ def write_page(
     title = f"{escape(task)}: a clip of one's own"
     body = "".join(page)
     write_atomic(path, HTML.format(title=title, css=CSS + STRIP, links=links, body=body))
+
+
+def _films(seen, done, translated, z, fps):
+    """The section with the clip, its re-enactment, translation and keypoints side by side."""
+    films = {"the clip": seen, "done again": done, "its translation": translated,
+             "its keypoints": draw_keypoints(translated, z, SCALE)}  # fmt: skip
+    title = "Clip, re-enactment, translation, keypoints"
+    return section(title, SIDE_BY_SIDE, Film(films, fps).html())
 
 
 def nearest(times: np.ndarray, t: float) -> int:

@@ -88,8 +88,8 @@ class Tracks:
                 path[part], sure[part] = _corrected(
                     self.times[part], path[part], sure[part], inside
                 )
-                ends = (float(self.times[frame[s]]) for s in inside[[0, -1], 2])
-                yours.append((name, *ends))
+                start, end = (float(self.times[frame[s]]) for s in inside[[0, -1], 2])
+                yours.append((name, start, end))
         return replace(self, yours=tuple(yours), **{name: path, f"{name}_sure": sure})
 
 
