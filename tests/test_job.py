@@ -19,7 +19,7 @@ def test_a_new_run_clears_an_older_runs_results_and_nothing_else(tmp_path):
     prepare_folder(tmp_path, {"seed": 0}, resume=False)
     old = ("policy.checkpoint", "policy.frames", "policy.safetensors", "policy_log.json",
            "metrics.json", "report.html", "prepare.html", "reenactment.mp4",
-           "stills.webp")  # fmt: skip
+           "stills.webp", "prepare.json")  # fmt: skip
     for name in (*old, "thesis.txt", "notes.json"):
         (tmp_path / name).write_text("")
     assert prepare_folder(tmp_path, {"seed": 1}, resume=False) == tmp_path

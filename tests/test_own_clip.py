@@ -1,5 +1,6 @@
 """A clip of one's own in the folder of a run."""
 
+import json
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -14,6 +15,7 @@ from tasks.commands.own_clip import bring
 def test_a_run_on_a_clip_keeps_clear_of_other_runs():
     assert folder("push", None) == Path("runs/push")
     assert folder("push", Path("clips/my clip.v2.mp4")) == Path("runs/push-my clip.v2")
+    assert folder("push", Path("my.mp4"), Path("there")) == Path("there/push-my")
 
 
 def test_stills_come_back_in_their_order_and_an_older_clips_are_removed(tmp_path):
@@ -30,6 +32,13 @@ def test_stills_come_back_in_their_order_and_an_older_clips_are_removed(tmp_path
     write_stills(file, stills[:0])
 
 
+NOTE = {
+    "clip": "my.mp4",
+    "corrections": "--tip 3,4@1",
+    "command": "prepare push my.mp4 --tip 3,4@1",
+}
+
+
 def prepared(here):
     """What `prepare` leaves in a folder, of a clip called my.mp4."""
     here.mkdir()
@@ -37,6 +46,7 @@ def prepared(here):
     (here / "prepare.html").write_text(f"{nav}Push: usable. <nav>\\1</nav>\n")
     (here / "stills.webp").write_bytes(b"stills of my.mp4")
     (here / "reenactment.mp4").write_bytes(b"its motion")
+    (here / "prepare.json").write_text(json.dumps(NOTE))
     return here / "reenactment.mp4"
 
 
@@ -44,11 +54,14 @@ def test_a_film_that_prepare_made_brings_its_page_with_links_of_the_runs_own(tmp
     run, film = tmp_path / "run", prepared(tmp_path / "made")
     run.mkdir()
     monkeypatch.setattr(own_clip, "links", lambda page: f"<nav>{page.parent.name} \\2</nav>\n")
-    bring(run, "push", SimpleNamespace(done=None, file=b"as it is learnt from"), film)
+    clip = SimpleNamespace(done=None, file=b"as it is learnt from")
+    assert bring(run, "push", clip, film) == NOTE
     page = (run / "prepare.html").read_text()
     assert page == "<nav>run \\2</nav>\nPush: usable. <nav>\\1</nav>\n"
     assert (run / "stills.webp").read_bytes() == b"stills of my.mp4"
     assert (run / "reenactment.mp4").read_bytes() == b"as it is learnt from"
+    assert bring(tmp_path, "push", clip, run / "reenactment.mp4") == NOTE  # so has the run's film
+    assert bring(run, "push", clip, run / "reenactment.mp4") == NOTE  # where it lies already
 
 
 def test_any_other_clip_gets_a_page_of_its_own(tmp_path, monkeypatch):
@@ -59,8 +72,9 @@ def test_any_other_clip_gets_a_page_of_its_own(tmp_path, monkeypatch):
     film = prepared(tmp_path / "made")
     alone = tmp_path / "reenactment.mp4"
     for clip, file in ((own, film.with_name("my clip.mp4")), (own, alone), (again, film)):
-        bring(tmp_path, "push", clip, file)
-        command = wrote[-1][-1]
+        said = bring(tmp_path, "push", clip, file)
+        assert said == {"clip": file.name, "corrections": "", "command": ""}
+        note = wrote[-1][-1]
         assert wrote.pop()[:3] == (tmp_path, "push", clip)
         quoted = f"'{file}'" if " " in str(file) else f"{file}"
-        assert command == f"python -m tasks prepare push {quoted}"
+        assert note == said | {"command": f"python -m tasks prepare push {quoted}"}

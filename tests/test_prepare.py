@@ -17,8 +17,9 @@ from lbw_minimal.training import InputError
 from tasks import VIDEOS, bare
 from tasks.__main__ import main
 from tasks.commands import prepare
+from tasks.commands.choices import Choices
 from tasks.commands.job import check, parser
-from tasks.commands.prepare import Choices, Prepared, follow
+from tasks.commands.prepare import Prepared, follow
 from tasks.world import record_expert
 from tasks.world.scene import FPS
 

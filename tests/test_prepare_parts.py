@@ -11,7 +11,8 @@ from lbw_minimal.clips.paths import Tracks, Unusable
 from lbw_minimal.clips.reader import Clip
 from lbw_minimal.training import InputError
 from tasks.commands import prepare
-from tasks.commands.prepare import Choices, Prepared, follow
+from tasks.commands.choices import Choices, parser
+from tasks.commands.prepare import Prepared, follow
 
 
 def clip(n=6, height=90, width=160, start=0.0):
@@ -51,14 +52,34 @@ def test_a_usable_clip_is_told_with_its_warnings_and_how_to_learn_from_it(
         f"python -m tasks prepare push '{file}' --from 1 --tip 3,4@1.5 --no-mirror --out {out}"
     )
     learn = f"python -m tasks push --video {out / 'reenactment.mp4'} --out 'runs/push-my clip'"
-    assert asked == [("push", file, choices), ("push", result, command, learn)]
+    said = "--from 1 --no-mirror --tip 3,4@1.5"
+    note = {"clip": "my clip.mp4", "corrections": said, "command": command}
+    assert asked == [("push", file, choices), ("push", result, note, learn)]
     assert capsys.readouterr().out.splitlines() == [
         "usable, with 2 warnings", f"page: {out / 'page'}", "warning: It is dark.",
         "warning: It is far.", f"learn: {learn}",
     ]  # fmt: skip
     result.why_not = "no arm is seen."
     assert prepare.main(argv) == 2 and "learn:" not in capsys.readouterr().out
-    assert asked[-1] == ("push", result, command, "")
+    assert asked[-1] == ("push", result, note, "")
+
+
+def test_each_clip_is_prepared_in_a_folder_of_its_own(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(prepare, "prepare", lambda *what: prepared())
+    monkeypatch.setattr(prepare, "write", lambda out, *what: out / "page")
+    for name in ("one", "two"):
+        (tmp_path / f"{name}.mp4").touch()
+        assert prepare.main(["push", f"{name}.mp4"]) == 0
+        assert f"page: runs/prepare/push-{name}/page\n" in capsys.readouterr().out
+
+
+def test_choices_are_told_as_the_options_that_make_them():
+    assert str(Choices()) == ""
+    given = "--from 0.5 --to 12.345 --mirror --tip 3,4@1.5 --tip 5,6@2 --object 1348,7@0"
+    args = parser().read(["push", "a.mp4", *given.split()])
+    chosen = Choices(args.first, args.last, args.mirror, tuple(args.tip), tuple(args.object))
+    assert str(chosen) == given
 
 
 def test_a_clip_that_is_not_usable_leaves_no_film_of_another_one(tmp_path, monkeypatch):

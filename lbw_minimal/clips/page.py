@@ -87,7 +87,7 @@ def write_page(
     page += [f'<p class="note">{escape(warning)}</p>' for warning in warnings]
     if columns and shown is not None:
         seen = clip_column(frames, times, tracks, motion, shown)
-        page += _films(seen, *columns, _rate(shown) / 2)
+        page += _films(seen, columns, _rate(shown) / 2)
     clickable = tracks is not None or not columns  # nobody corrects a film taken as it is
     if clickable:
         used = None if motion is None else (motion.times[0], motion.times[-1])
@@ -112,8 +112,9 @@ def write_page(
     write_atomic(path, HTML.format(title=title, css=CSS + STRIP, links=links, body=body))
 
 
-def _films(seen, done, translated, z, fps):
+def _films(seen, columns, fps):
     """The section with the clip, its re-enactment, translation and keypoints side by side."""
+    done, translated, z = columns
     films = {"the clip": seen, "done again": done, "its translation": translated,
              "its keypoints": draw_keypoints(translated, z, SCALE)}  # fmt: skip
     title = "Clip, re-enactment, translation, keypoints"

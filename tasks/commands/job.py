@@ -24,7 +24,7 @@ from lbw_minimal.training import InputError, pick_device, write_atomic
 from tasks.commands import JITTER, Parser, at_least, make_folder, metres
 from tasks.commands.links import folder
 from tasks.commands.own_clip import bring
-from tasks.commands.prepare import FILM, PAGE, STILLS, usable
+from tasks.commands.prepare import FILM, NOTE, PAGE, STILLS, usable
 from tasks.commands.recipe import METHODS, PIXELS, fields_of, recipe_of
 from tasks.commands.record import EXPERTS
 
@@ -39,6 +39,7 @@ RESULTS = (
     FILM,
     PAGE,
     STILLS,
+    NOTE,
 )
 
 
@@ -153,7 +154,7 @@ def check(name: str, args: argparse.Namespace, argv: list[str]) -> Job:
     machine = f"{platform.machine()}, {os.cpu_count()} cores, torch {torch.__version__}"
     run.metrics["machine"] = machine
     if clip:
-        bring(run.out, name, clip, args.video)
+        run.metrics["clip"] = bring(run.out, name, clip, args.video)
     return Job(name, args, recipe, from_scratch, experts, random, perception, weights, command, run)
 
 

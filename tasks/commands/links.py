@@ -21,9 +21,9 @@ BESIDE = {
 }
 
 
-def folder(name: str, clip: Path | None) -> Path:
-    """Where a run of the task `name` writes by default: a clip's run keeps clear of the kit's."""
-    return RUNS / (f"{name}-{clip.stem}" if clip else name)
+def folder(name: str, clip: Path | None, runs: Path = RUNS) -> Path:
+    """Where a run of the task `name` writes by default: each clip has a folder of its own."""
+    return runs / (f"{name}-{clip.stem}" if clip else name)
 
 
 def links(page: Path, runs: Path = RUNS) -> str:

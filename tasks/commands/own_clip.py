@@ -6,6 +6,7 @@ beside it.
 
 from __future__ import annotations
 
+import json
 import re
 import shlex
 import shutil
@@ -13,18 +14,28 @@ from pathlib import Path
 
 from lbw_minimal.training import write_atomic
 from tasks.commands.links import links
-from tasks.commands.prepare import FILM, PAGE, STILLS, Prepared, write
+from tasks.commands.prepare import FILM, NOTE, PAGE, STILLS, Prepared, write
 
 NAV = re.compile(r"<nav.*?</nav>\n", re.DOTALL)
 
 
-def bring(out: Path, name: str, clip: Prepared, file: Path) -> None:
-    """Put film, page and stills of the clip into the run's folder; file: what --video named."""
-    page, stills = file.with_name(PAGE), file.with_name(STILLS)
-    if file.name == FILM and clip.done is None and page.exists() and stills.exists():
+def bring(out: Path, name: str, clip: Prepared, file: Path) -> dict[str, str]:
+    """Put film, page and stills of the clip into the run's folder; file: what --video named.
+
+    Returns the clip's name, its "corrections", and the "command" that has to come before the run's,
+    if there is one.
+    """
+    page, stills, note = (file.with_name(beside) for beside in (PAGE, STILLS, NOTE))
+    made = all(beside.exists() for beside in (page, stills, note))
+    if file.name == FILM and clip.done is None and made:
         write_atomic(out / FILM, clip.file)
-        shutil.copy(stills, out)
+        if out.resolve() != file.parent.resolve():
+            shutil.copy(stills, out)
+            shutil.copy(note, out)
         text, here = page.read_text(encoding="utf-8"), links(out / PAGE)
         write_atomic(out / PAGE, NAV.sub(lambda _: here, text, count=1))
-        return
-    write(out, name, clip, shlex.join(["python", "-m", "tasks", "prepare", name, str(file)]))
+        return json.loads(note.read_text(encoding="utf-8"))
+    command = shlex.join(["python", "-m", "tasks", "prepare", name, str(file)])
+    said = {"clip": file.name, "corrections": "", "command": command}
+    write(out, name, clip, said)
+    return said | {"command": ""}  # the run's own does it as well

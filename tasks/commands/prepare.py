@@ -7,7 +7,7 @@ the simulated human in front of the kit's own camera.
 
 from __future__ import annotations
 
-import argparse
+import json
 import shlex
 import sys
 import tempfile
@@ -15,7 +15,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -33,36 +32,24 @@ from lbw_minimal.clips.stills import write_stills
 from lbw_minimal.pictures import spread
 from lbw_minimal.report import COLUMNS
 from lbw_minimal.training import InputError, write_atomic
-from tasks.commands import Parser, make_folder, within
-from tasks.commands.links import folder, links
+from tasks.commands import make_folder
+from tasks.commands.choices import Choices, parser
+from tasks.commands.links import RUNS, folder, links
 from tasks.world.reenact import Reenactment, reenact
 
 FILM, PAGE = "reenactment.mp4", "prepare.html"
+NOTE = "prepare.json"  # the clip's name, its corrections and the command, for the report of a run
 STILLS = "stills.webp"  # of a clip that was re-enacted, for the report of a run
 SHOWN = 60  # frames of the page's film, which are translated as well: 4 s of work on one core
 OWN = 12  # grey levels: the kit's own films begin with the scene's picture to within 6 of 256
 SLACK = 0.01  # s: the page rounds times to 0.001
 OWN_STEP = 0.05  # s between frames: a film that is slower has to be interpolated, as a motion
 EYES = tasks.WEIGHTS / "eyes" / "eyes.safetensors"  # the detector of tip and object
-WHERE = "as a click into the page writes it; may be given several times"
-
-Mark = tuple[float, float, float]  # x, y in pixels of the clip, s
 
 
 def no_frames() -> np.ndarray:
     """A film (0, 84, 84, 3) of no frames."""
     return np.zeros((0, video.SIZE, video.SIZE, 3), np.uint8)
-
-
-@dataclass(frozen=True)
-class Choices:
-    """What the user decides instead of the clip."""
-
-    first: float = 0.0  # s
-    last: float | None = None  # s
-    mirror: bool | None = None
-    tip: tuple[Mark, ...] = ()
-    object: tuple[Mark, ...] = ()
 
 
 class Misplaced(InputError):
@@ -95,43 +82,6 @@ class Prepared:
         return "usable" + (", with a warning" if len(self.warnings) == 1 else several)
 
 
-def parser() -> Parser:
-    """The arguments of `prepare`."""
-    p = Parser("prepare", "Make a clip of an arm into a human video of a task, and say how.")
-    p.add_task()
-    add = p.add_argument
-    add("file", type=Path, metavar="FILE", help="the clip, as a phone or a webcam wrote it")
-    add(
-        "--from",
-        type=seconds,
-        dest="first",
-        default=0.0,
-        metavar="S",
-        help="leave out what is before",
-    )
-    add("--to", type=seconds, dest="last", metavar="S", help="and after")
-    add("--mirror", action=argparse.BooleanOptionalAction, help="left for right (as it goes)")
-    marks: Any = {"type": mark, "action": "append", "default": [], "metavar": "X,Y@S"}
-    add("--tip", **marks, help=f"where the tip is: {WHERE}")
-    add("--object", **marks, help=f"and the object: {WHERE}")
-    add("--out", type=Path, metavar="DIR", help="its folder (runs/prepare/TASK)")
-    return p
-
-
-# a type for argparse
-seconds = within(0, sys.float_info.max, "time in seconds from 0 on")
-
-
-def mark(text: str) -> Mark:
-    """A type for argparse: X,Y@S, a place in a clip in pixels, and a time in s."""
-    try:
-        where, when = text.split("@")
-        x, y = (float(part) for part in where.split(","))
-        return x, y, seconds(when)
-    except (ValueError, argparse.ArgumentTypeError):
-        raise argparse.ArgumentTypeError(f"{text!r} is no place and time like 120,85@1.5") from None
-
-
 def main(argv: list[str]) -> int:
     """Prepare the clip, print the verdict, and return the exit code: 2 if it is not usable.
 
@@ -141,7 +91,7 @@ def main(argv: list[str]) -> int:
     if not args.file.is_file():
         raise InputError(f"{args.file}: there is no such file; check the path.")
     choices = Choices(args.first, args.last, args.mirror, tuple(args.tip), tuple(args.object))
-    out = args.out or Path("runs") / "prepare" / args.task
+    out = args.out or folder(args.task, args.file, RUNS / "prepare")
     try:
         result = prepare(args.task, args.file, choices)
     except Misplaced:  # a mistake of the command, not the clip's: its page stays
@@ -151,13 +101,14 @@ def main(argv: list[str]) -> int:
         return 2
     make_folder(out)
     if result.why_not and args.file.resolve() != (out / FILM).resolve():
-        for before in (FILM, STILLS):  # of another clip, which nobody is to learn from by mistake
+        for before in (FILM, STILLS, NOTE):  # which nobody is to learn from by mistake
             (out / before).unlink(missing_ok=True)
     # The film's name is every clip's; a run bears the clip's.
-    named = [] if args.file.name == FILM else ["--out", str(folder(args.task, args.file))]
-    learn = shlex.join(["python", "-m", "tasks", args.task, "--video", str(out / FILM), *named])
+    named = ["--video", str(out / FILM), "--out", str(folder(args.task, args.file))]
+    learn = shlex.join(["python", "-m", "tasks", args.task, *named])
     command = shlex.join(["python", "-m", "tasks", "prepare", *argv])
-    page = write(out, args.task, result, command, "" if result.why_not else learn)
+    note = {"clip": args.file.name, "corrections": str(choices), "command": command}
+    page = write(out, args.task, result, note, "" if result.why_not else learn)
     print(f"{result.verdict}\npage: {page}")
     for warning in result.warnings:
         print(f"warning: {warning}")
@@ -302,22 +253,24 @@ def keep(result: Prepared, frames: np.ndarray) -> None:
         result.file, result.film = path.read_bytes(), video.read(path)[0]
 
 
-def write(out: Path, name: str, result: Prepared, command: str, learn: str = "") -> Path:
+def write(out: Path, name: str, result: Prepared, note: dict[str, str], learn: str = "") -> Path:
     """Write the page, and the film of a usable clip, into the folder `out`. Returns the page.
 
-    command: what made them; learn: the command that comes next, if there is one.
+    note: the name of the "clip", its "corrections", and the "command" that made all this; learn:
+    the command that comes next, if there is one.
     """
     shown, columns = None, tuple[np.ndarray, ...]()
     if len(result.film):
         write_atomic(out / FILM, result.file)
         write_stills(out / STILLS, stills(result))
+        write_atomic(out / NOTE, json.dumps(note))
         perception = imitate.load_perception(tasks.WEIGHTS / name, name)
         shown = spread(len(result.film), SHOWN)
         translated = perception.translate(result.film[shown])
         columns = result.film[shown], translated, perception.detect(translated)
     page, clip = out / PAGE, result.clip
     write_page(
-        page, task=name, command=command, verdict=result.verdict, frames=clip.frames,
+        page, task=name, command=note["command"], verdict=result.verdict, frames=clip.frames,
         times=clip.times, scene=result.scene, notes=result.notes, warnings=result.warnings,
         tracks=result.tracks, motion=result.done.motion if result.done else result.motion,
         states=result.done.recording.states if result.done else None, columns=columns, shown=shown,

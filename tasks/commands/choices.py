@@ -1,0 +1,77 @@
+"""What `prepare` is asked: its arguments, and what the user decides instead of the clip."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from tasks.commands import Parser, within
+
+WHERE = "as a click into the page writes it; may be given several times"
+
+Mark = tuple[float, float, float]  # x, y in pixels of the clip, s
+
+
+@dataclass(frozen=True)
+class Choices:
+    """What the user decides instead of the clip."""
+
+    first: float = 0.0  # s
+    last: float | None = None  # s
+    mirror: bool | None = None
+    tip: tuple[Mark, ...] = ()
+    object: tuple[Mark, ...] = ()
+
+    def __str__(self) -> str:
+        """The options that say so, as on a command line; "" if all is left to the clip."""
+        said = [f"--from {self.first:g}"] if self.first else []
+        said += [] if self.last is None else [f"--to {self.last:g}"]
+        said += [] if self.mirror is None else ["--mirror" if self.mirror else "--no-mirror"]
+        for name, marks in (("tip", self.tip), ("object", self.object)):
+            said += [f"--{name} {x:g},{y:g}@{s:g}" for x, y, s in marks]
+        return " ".join(said)
+
+
+def parser() -> Parser:
+    """The arguments of `prepare`."""
+    p = Parser("prepare", "Make a clip of an arm into a human video of a task, and say how.")
+    p.add_task()
+    add = p.add_argument
+    add("file", type=Path, metavar="FILE", help="the clip, as a phone or a webcam wrote it")
+    add(
+        "--from",
+        type=seconds,
+        dest="first",
+        default=0.0,
+        metavar="S",
+        help="leave out what is before",
+    )
+    add("--to", type=seconds, dest="last", metavar="S", help="and after")
+    add("--mirror", action=argparse.BooleanOptionalAction, help="left for right (as it goes)")
+    marks: Any = {"type": mark, "action": "append", "default": [], "metavar": "X,Y@S"}
+    add("--tip", **marks, help=f"where the tip is: {WHERE}")
+    add("--object", **marks, help=f"and the object: {WHERE}")
+    add(
+        "--out",
+        type=Path,
+        metavar="DIR",
+        help="its folder (runs/prepare/TASK-NAME, NAME being the clip's)",
+    )
+    return p
+
+
+# a type for argparse
+seconds = within(0, sys.float_info.max, "time in seconds from 0 on")
+
+
+def mark(text: str) -> Mark:
+    """A type for argparse: X,Y@S, a place in a clip in pixels, and a time in s."""
+    try:
+        where, when = text.split("@")
+        x, y = (float(part) for part in where.split(","))
+        return x, y, seconds(when)
+    except (ValueError, argparse.ArgumentTypeError):
+        raise argparse.ArgumentTypeError(f"{text!r} is no place and time like 120,85@1.5") from None
