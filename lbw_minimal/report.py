@@ -33,6 +33,7 @@ from lbw_minimal.report_texts import (
     CSS,
     DEMONSTRATION,
     EPISODE,
+    GOAL,
     HTML,
     INTRODUCTION,
     LEARNING,
@@ -91,6 +92,7 @@ def write_report(
     metrics: dict | None = None,
     scene_html: str | None = None,
     command: str | None = None,
+    goal: str = "",
     links: str = "",
     fps: float = 25,
 ) -> None:
@@ -102,26 +104,25 @@ def write_report(
     policy's, a row per episode. episode: a test episode's "frames" (T, 84, 84, 3) uint8, "z"
     (T, K, 2) (or observations whose first 2K numbers are z), and "parts", a dict of reward parts
     per step. metrics: as in metrics.json: "success", "episodes", "stages" in s, "perception",
-    "settings", "machine". scene_html: a page of its own. command: what makes this run again.
-    links: HTML that leads to other pages.
+    "settings", "machine", and of a person's clip "clip": the "clip"'s name, its "corrections", and
+    the "command" that comes before this run's. scene_html: a page of its own. command: what makes
+    this run again. goal: what success is. links: HTML that leads to other pages.
     """
     metrics, episode = metrics or {}, episode or {}
-    settings = metrics.get("settings", {})
+    settings, ends = metrics.get("settings", {}), metrics.get("episodes", [])
     method = settings.get("method", "lbw")
     form = settings.get("reward", "mended") if method == "lbw" else "classifier"
     kind = method if method in ("lbw", "tracks") else "rival"
     form = "object tracks'" if kind == "tracks" else form
-    page = [headline(task, metrics, method)]
+    page = [headline(task, metrics, method, goal)]
     if clip is not None:
-        page += section("Your clip", CLIP[method], strip(clip))
+        page += section("Your clip", CLIP[method], whose(metrics.get("clip")), strip(clip))
     if translated is not None and z_demo is not None and "frames" in episode:
         page.append(_method(demo, translated, z_demo, episode))
     columns = demonstration(demo, translated, z_demo, fps, logits)
     page += section(SHOWN[method], DEMONSTRATION[method], columns)
     if "frames" in episode:
-        page += _test_episode(
-            demo, translated, z_demo, episode, metrics.get("episodes", []), fps, kind
-        )
+        page += _test_episode(demo, translated, z_demo, episode, ends, fps, kind)
     if scene_html:
         frame = f'<iframe title="The episode in 3-D" srcdoc="{escape(scene_html)}"></iframe>'
         page += section("The same episode in three dimensions", SCENE, frame, kind="scene")
@@ -129,12 +130,12 @@ def write_report(
         shown = picture(svg(curve(log, form)), "Learning curves")
         page += section("How the robot learnt", LEARNING[kind], shown)
     if episode.get("parts"):
-        done = metrics["episodes"][0].get("first_success") if metrics.get("episodes") else None
+        done = ends[0].get("first_success") if ends else None
         shown = picture(svg(parts(episode["parts"], fps, done)), "Parts of the reward over time")
         page += section("The reward, step by step", REWARD[kind], shown)
     page += figures(metrics)
     if command:
-        page += section("To make this run again", f"<pre>{escape(command)}</pre>")
+        page += again(command, metrics.get("clip", {}))
     title = f"{escape(task)}: learning by watching"
     write_atomic(path, HTML.format(title=title, css=CSS, links=links, body="".join(page)))
 
@@ -180,7 +181,23 @@ def section(title: str, *body: str, kind: str = "") -> list[str]:
     return [f'<section class="{kind}">\n<h2>{title}</h2>', *body, "</section>\n"]
 
 
-def headline(task: str, metrics: dict[str, Any], method: str = "lbw") -> str:
+def again(command: str, clip: dict[str, str]) -> list[str]:
+    """The section with the run's command, and before it the one that prepared a person's clip."""
+    lines = "\n".join(filter(None, [clip.get("command"), command]))
+    return section("To make this run again", f"<pre>{escape(lines)}</pre>")
+
+
+def whose(clip: dict[str, str] | None) -> str:
+    """Which clip that is, and what its owner decided: the "clip"'s name and its "corrections"."""
+    if not clip:
+        return ""
+    how = (
+        f"corrected by <code>{escape(c)}</code>" if (c := clip["corrections"]) else "not corrected"
+    )
+    return f"<p><b>{escape(clip['clip'])}</b>, {how}.</p>"
+
+
+def headline(task: str, metrics: dict[str, Any], method: str = "lbw", goal: str = "") -> str:
     """The result in large letters, its figures in tiles, and how it came about."""
     settings, result = metrics.get("settings", {}), metrics.get("success")
     name = escape(task).capitalize()
@@ -190,7 +207,7 @@ def headline(task: str, metrics: dict[str, Any], method: str = "lbw") -> str:
         title = f"{name}: {round(result['rate'] * n)} of {n} test episodes succeed"
         low, rate, high = (round(100 * result[key]) for key in ("low", "rate", "high"))
         tiles = [(f"{rate} %", "success rate"), (f"{low}-{high} %", "95 % confidence interval")]
-    notes = [SMOKE] if settings.get("fast") else []
+    notes, learnt = [SMOKE] if settings.get("fast") else [], ""
     shown = ["reward" if method == "lbw" else "method"]
     if stages := metrics.get("stages"):
         taught = {name: stages[name] for name in LEARNS[method] if name in stages}
@@ -198,10 +215,13 @@ def headline(task: str, metrics: dict[str, Any], method: str = "lbw") -> str:
             tiles += [(duration(sum(taught.values())), "of learning in this run")]
             shown = ["seed", *shown]  # a replay's is not the one that the policy learnt with
         if not set(LEARNS[method]) <= set(taught):
-            notes += [LEARNT.format(escape(", ".join(taught))) if taught else REPLAY]
+            notes += [] if taught else [REPLAY]
+            learnt = LEARNT.format(escape(", ".join(taught))) if taught else ""
     tiles += [(str(settings[key]), key) for key in shown if key in settings]
     cells = "".join(f"<div><b>{escape(v)}</b><span>{label}</span></div>" for v, label in tiles)
     noted = "".join(f'<p class="note">{note}</p>' for note in notes)
+    said = " ".join(filter(None, [GOAL.format(escape(goal)) if goal else "", learnt]))
+    noted += f"<p>{said}</p>" if said else ""
     return f'<h1>{title}</h1>\n<div class="tiles">{cells}</div>\n{noted}{INTRODUCTION[method]}'
 
 

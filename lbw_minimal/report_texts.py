@@ -242,5 +242,6 @@ move.</p>
 
 
 SMOKE = "This was a smoke run: no stage ran long enough to learn. Its figures say nothing."
+GOAL = "An episode is a success if {}."
 LEARNT = "Learnt in this run: {}. The rest was trained before."
 REPLAY = "A replay: nothing was learnt in this run. What it shows was trained before."

@@ -246,7 +246,7 @@ def learn(
     checkpoint = checkpoint or Checkpoint(None)
     stateful = {"sac": sac, "buffer": buffer, "rng": rng}
     now, state = checkpoint.resume(stateful, step=0, log=[], candidates=[])
-    bar = progress(steps, "policy", now.step)
+    bar = progress(steps, "policy", min(now.step, steps))
     while now.step < steps:
         rows: list[dict] = []
         losses, ended = [], False
@@ -273,7 +273,7 @@ def learn(
         if len(now.log) % WINDOW == 0:
             now.candidates = _best(now.candidates, now.log, sac)
         bar.set_postfix_str(f"return {now.log[-1]['return']:.2f}", refresh=False)
-        bar.update(len(rows))
+        bar.update(min(now.step, steps) - bar.n)  # the last episode may be longer than is left
         checkpoint.save(state)
     bar.close()
     checkpoint.save(state, force=True)

@@ -36,6 +36,11 @@ def sentence(name: str) -> str:
     return " ".join((module(name).__doc__ or "").partition("\n\n")[0].split())
 
 
+def goal(name: str) -> str:
+    """What success is in the task, in words without a full stop; "" if its file does not say."""
+    return getattr(module(name), name.capitalize()).GOAL
+
+
 def id_of(name: str) -> str:
     """What Gymnasium calls the task."""
     return f"LbW-{name.capitalize()}-v0"

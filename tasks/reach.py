@@ -20,6 +20,7 @@ SUCCESS = 0.05  # m, distance from tip to target: Fetch's `distance_threshold`
 
 class Reach(TaskEnv):
     __doc__ = __doc__
+    GOAL = f"the tip gets to within {100 * SUCCESS:g} cm of the ball's centre"
 
     def furnish(self) -> None:
         self.world.sphere(RADIUS, TARGET, GREEN, solid=False)

@@ -238,6 +238,19 @@ def test_the_report_of_a_run_and_the_page_of_its_clip_lead_to_each_other(tmp_pat
     assert re.findall('href="([^"]+)"', links.links(run / "report.html", runs)) == ["prepare.html"]
 
 
+def test_a_page_leads_to_the_runs_on_clips_which_bear_any_name(tmp_path):
+    for name in ("push-a & b/prepare.html", "push-a & b/report.html", "slide-c/prepare.html",
+                 "prepare/push-a & b/prepare.html", "other/report.html"):  # fmt: skip
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).touch()
+    for page in ("gallery/index.html", "push-d/report.html"):
+        said = links.links(tmp_path / page, tmp_path)
+        way = '<a href="../push-a &amp; b/report.html">a run on a clip: push-a &amp; b</a>'
+        assert re.findall("<a href.*?</a>", said) == [way]  # the other clip's run is not done
+    itself = links.links(tmp_path / "push-a & b" / "report.html", tmp_path)
+    assert re.findall('href="([^"]+)"', itself) == ["prepare.html"]
+
+
 def test_a_figure_is_described_by_its_own_words():
     from matplotlib.figure import Figure
 

@@ -298,6 +298,14 @@ def test_what_was_trained_before_is_told_from_what_was_learnt(tmp_path, run, met
     page = written(tmp_path, run)
     assert f"<b>{report.duration(60 * len(stages))}</b><span>of learning" in page
     assert said in page if said else "trained before" not in page
+    assert 'class="note"' not in page  # which is for warnings
+
+
+def test_what_success_is_stands_below_the_figures(tmp_path, run):
+    page = written(tmp_path, run | {"goal": "the cube gets < 5 cm near"})
+    said = "<p>An episode is a success if the cube gets &lt; 5 cm near."
+    assert page.index('<div class="tiles">') < page.index(said) < page.index("<h2>")
+    assert "is a success if" not in written(tmp_path, run | {"goal": ""})
 
 
 def test_text_of_the_run_cannot_break_the_page(tmp_path, run):
@@ -327,4 +335,11 @@ def test_a_persons_clip_comes_before_all_else_that_was_seen(tmp_path, run, metho
     np.testing.assert_array_equal(shown, stills)
     assert [k for _, k in images] == list("12345")
     assert 'href="prepare.html"' in part
+    run["metrics"]["clip"] = {"clip": "a <b>.mp4", "corrections": "", "command": ""}
+    page = written(tmp_path, run | {"clip": stills, "command": "run <it>"})
+    assert "<b>a &lt;b&gt;.mp4</b>, not corrected." in page and "<pre>run &lt;it&gt;</pre>" in page
+    run["metrics"]["clip"] |= {"corrections": "--tip 3,4@1", "command": "prepare 'a <b>.mp4'"}
+    page = written(tmp_path, run | {"clip": stills, "command": "run <it>"})
+    assert "corrected by <code>--tip 3,4@1</code>." in page
+    assert "<pre>prepare &#x27;a &lt;b&gt;.mp4&#x27;\nrun &lt;it&gt;</pre>" in page
     assert "Your clip" not in written(tmp_path, run)

@@ -455,6 +455,12 @@ def test_success_is_logged_and_teaches_nothing():
         assert torch.equal(p, q)
 
 
+def test_the_bar_ends_at_its_total_though_the_last_episode_goes_on(capsys):
+    """Episodes of 20 steps: the third ends after the fiftieth step."""
+    train(Walk(), steps=50, seed=0, random_steps=100, width=8, batch=8)
+    assert "50/50" in capsys.readouterr().err.splitlines()[-1].split("\r")[-1]
+
+
 def test_the_log_has_reward_parts_losses_and_evaluations():
     seen = []
     test = {"evaluate": lambda sac: seen.append(sac) or {"test": 1.0}, "evaluate_every": 2}

@@ -155,6 +155,7 @@ def test_success_is_within_as_many_centimetres_as_the_paper_or_its_source_says(
             env.world.p.resetBasePositionAndOrientation(getattr(env, body), place, (0, 0, 0, 1))
             assert env.is_success() == done, place
     env.close()
+    assert f" {100 * within:.0f} cm of " in tasks.goal(name)
 
 
 def test_a_ball_is_reached_within_5_cm_and_a_drawer_is_shut_from_3_cm_on():
@@ -170,6 +171,7 @@ def test_a_ball_is_reached_within_5_cm_and_a_drawer_is_shut_from_3_cm_on():
         drawer.world.p.resetJointState(drawer.drawer, 0, q)
         assert drawer.is_success() == done
     reach.close(), drawer.close()
+    assert " 5 cm of " in tasks.goal("reach") and " 3 cm at most" in tasks.goal("drawer")
 
 
 def test_a_puck_that_slides_through_its_target_is_not_there_yet():

@@ -38,13 +38,16 @@ def links(page: Path, runs: Path = RUNS) -> str:
     if needs and page.with_name(needs).exists():
         items.append(f'<a href="{file}">{name}</a>')
     reports = {f"{task}/report.html": (f"a run of {task}", "") for task in tasks.TASKS}
+    for clip in sorted(runs.glob("*/prepare.html")):  # which a run on a clip has in its folder
+        run = clip.parent.name
+        reports.setdefault(f"{run}/report.html", (f"a run on a clip: {run}", ""))
     for file, (name, command) in (PAGES | reports).items():
         there = runs / file
         if there == here:
             continue
         if there.exists() and here.is_relative_to(runs):
             way = Path(os.path.relpath(there, here.parent)).as_posix()
-            items.append(f'<a href="{escape(way)}">{name}</a>')
+            items.append(f'<a href="{escape(way)}">{escape(name)}</a>')
         elif command:
             items.append(f"<span>{name}: <code>{command}</code></span>")
     return f'<nav aria-label="The kit\'s other pages">{"".join(items)}</nav>\n'

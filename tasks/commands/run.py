@@ -212,6 +212,7 @@ def report(job: Job, seen: dict[str, Any], first: dict[str, Any], scene: str) ->
         task=job.name,
         **seen,
         clip=read_stills(out / STILLS),
+        goal=tasks.goal(job.name),
         log=json.loads(log.read_text(encoding="utf-8"))
         if log.exists()
         else [],  # a replayed policy has none

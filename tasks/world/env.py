@@ -50,6 +50,7 @@ class TaskEnv(gym.Env, EzPickle):
     metadata = {"render_modes": ["rgb_array"], "render_fps": 25}
 
     # Every task states these; the values here are what most tasks use.
+    GOAL = ""  # what success is, for the report of a run: "the cube gets ..."
     STEP = 0.03  # m, the tip's goal moves this far per control step at full action
     # How far, in m, the goal may run ahead of the tip. No frame shows the goal: the policy has to
     # infer it from how the tip moved. With 0.05 instead of 0.03, one that saw
