@@ -46,7 +46,8 @@ def test_the_goal_is_drawn_where_the_object_has_to_get(name):
     way = env.world.pixel(env.target_position()) - env.world.pixel(env.object_position())
     env.close()
     paths = dict(re.findall(r'<path class="(\w+)" d="(.*?)"/>', text))
-    assert ("goal" in paths) == (name != "reach")
+    assert ("goal" in paths) == (name != "reach") == ("dashed the place" in text)
+    assert "Start with the hand where the blue arm is" in text
     if "goal" in paths:
         start, goal = (
             np.array(re.findall(r"[\d.e-]+", paths[k]), float) for k in ("object", "goal")
@@ -61,7 +62,7 @@ def test_the_page_says_what_to_do_and_asks_nobody_for_anything(tmp_path, capsys)
     text = (tmp_path / "coffee.html").read_text(encoding="utf-8")
     assert "default-src 'none'" in text and "Put a mug" in text
     assert not re.search(r"https?://|src=|href=\"", text)
-    assert not re.search(r"\{(task|what|size|outlines|name)\}", text)
+    assert not re.search(r"\{(task|what|orange|size|outlines|name)\}", text)
 
 
 @pytest.mark.skipif(not browser.CHROMIUM, reason="needs Chromium")
@@ -95,6 +96,8 @@ def test_a_browser_records_what_its_camera_sees(tmp_path):
             await shown.until(state, "recorded")
             name = await shown.js("document.getElementById('save').download")
             assert await shown.js("document.getElementById('clip').textContent") == name
+            command = "document.getElementById('clip').parentElement.textContent"
+            assert await shown.js(command) == f"python -m tasks prepare push PATH/TO/{name}"
             return name, base64.b64decode((await shown.js(read)).split(",", 1)[1])
 
     name, data = asyncio.run(record())

@@ -15,7 +15,7 @@ import numpy as np
 
 import tasks
 from tasks.commands import Parser, make_folder
-from tasks.commands.stage_page import PAGE, WHAT_TO_DO
+from tasks.commands.stage_page import ORANGE, PAGE, WHAT_TO_DO
 from tasks.world import TaskEnv
 from tasks.world.scene import SIZE
 
@@ -54,6 +54,7 @@ def page(task: str) -> str:
     return (
         PAGE.replace("{task}", task)
         .replace("{what}", WHAT_TO_DO[task])
+        .replace("{orange}", ORANGE["goal" in drawn])
         .replace("{size}", str(SIZE))
         .replace("{outlines}", "\n".join(paths))
         .replace("{name}", json.dumps(f"{task}-clip"))

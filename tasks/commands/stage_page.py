@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+START = "Start with the hand where the blue arm is, fingers down."
 WHAT_TO_DO = {
-    "reach": """Put something small and colourful where the solid outline is, such as a bottle cap
-on a stand. Start with the hand where the arm is drawn, fingers down, and bring the finger tips to
-it. Stay there for a moment.""",
-    "push": """Put a small box or a can where the solid outline is. Start with the hand where the
-arm is drawn, fingers down. Come down behind the object and push it along the table to the dashed
-outline. Stay there for a moment.""",
-    "slide": """Put something flat that slides well where the solid outline is, such as a puck or a
-coaster. Come down behind it and give it one hit, so that it slides on alone and stops at the dashed
-outline. Keep recording until it rests.""",
-    "coffee": """Put a mug where the solid outline is, and something tall where the machine is.
-Come down behind the mug and push it under the machine, to the dashed outline.""",
-    "drawer": """Open a drawer, or stand a box on the table, with its front at the solid outline.
-Push the front with the finger tips until it is where the dashed outline is.""",
+    "reach": f"""Put something small and colourful where the orange outline is, such as a bottle cap
+on a stand. {START} Bring the finger tips to it, and stay there for a moment.""",
+    "push": f"""Put a small box or a can where the solid orange outline is. {START} Come down behind
+the object and push it along the table to the dashed outline. Stay there for a moment.""",
+    "slide": f"""Put something flat that slides well where the solid orange outline is, such as a
+puck or a coaster. {START} Come down behind it and give it one hit, so that it slides on alone and
+stops at the dashed outline. Keep recording until it rests.""",
+    "coffee": f"""Put a mug where the solid orange outline is, and something tall where the machine
+is. {START} Come down behind the mug and push it under the machine, to the dashed outline. Stay
+there for a moment.""",
+    "drawer": f"""Open a drawer, or stand a box on the table, with its front at the left end of the
+solid orange outline. {START} Push the front with the finger tips until it is where the dashed
+outline begins. Stay there for a moment.""",
+}
+
+ORANGE = {  # whether a goal is drawn -> what is orange
+    False: "the thing to reach",
+    True: "the object, and dashed the place it has to get to",
 }
 
 PAGE = """<!DOCTYPE html>
@@ -62,7 +68,7 @@ code { background: var(--panel); padding: .1rem .3rem; border-radius: 4px }
 <video id="live" autoplay muted playsinline aria-label="The camera's picture"></video>
 <video id="film" controls loop playsinline hidden aria-label="What was recorded"></video>
 <svg viewBox="0 0 {size} {size}" role="img"
- aria-label="Outline of the scene: arm blue, object orange, its goal dashed">
+ aria-label="Outline of the scene">
 {outlines}
 </svg>
 <div id="count" aria-hidden="true"></div>
@@ -76,16 +82,20 @@ code { background: var(--panel); padding: .1rem .3rem; border-radius: 4px }
 <label>Outline <input id="shown" type="range" min="0" max="1" step="0.05" value="0.9"></label>
 </div>
 <p id="told" role="status"></p>
+<p>Blue: your arm. Orange: {orange}. Grey: the table and what stands on it.</p>
 <p id="other" hidden><label>Film it with the camera's own app instead:
 <input id="file" type="file" accept="video/*" capture="environment"></label></p>
 <ul>
 <li>Camera: to the side of the table, a little above it, and still. Lean it against something.</li>
-<li>Arm: from the left, bare or in a sleeve, with nothing else that moves in the picture.</li>
+<li>Arm: from the left, or from above as it is drawn; bare or in a sleeve, with nothing else that
+moves in the picture.</li>
 <li>The outline is a help. A clip need not fit it exactly, but object and goal have to be in the
 picture.</li>
 <li>Nothing leaves this machine: the page has no way to send anything.</li>
 </ul>
-<p>Then, beside the kit: <code>python -m tasks prepare {task} <span id="clip">CLIP</span></code></p>
+<p>Then, in a terminal in the kit's folder, with the path to the saved film, which most browsers put
+into Downloads: <code>python -m tasks prepare {task} PATH/TO/<span id="clip">CLIP</span></code>.
+From a phone the film has to get to the computer first.</p>
 </main>
 <script>
 "use strict";
