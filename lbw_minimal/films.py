@@ -1,8 +1,9 @@
 """Films side by side, for notebooks and pages: in one piece of HTML that needs no other file.
 
-In: frames (T, H, H, 3) uint8 of each film. Out: HTML with a looping video in it, which has its
-browser's controls and stands still until asked where the reader's system asks for less motion. On
-paper, and where no video plays, a picture stands in for it.
+In: frames (T, H, H, 3) uint8 of each film. Out: HTML with a looping video in it, which stands
+still until asked where the reader's system asks for less motion. Its controls are below it: a
+browser's own would hide the lower part of a small film. On paper, and where no video plays, a
+picture stands in for it.
 """
 
 from __future__ import annotations
@@ -27,12 +28,21 @@ REST = 1.0  # s for which the end stays before the film starts over
 CODEC = "libvpx-vp9"
 FINE = {"crf": "34", "b:v": "0", "deadline": "realtime", "cpu-used": "8"}
 CALM = "matchMedia('(prefers-reduced-motion: reduce)').matches && this.pause()"
+FIND = "this.closest('.film').querySelector('{}')"
+VIDEO, BUTTON, SLIDER = (FIND.format(name) for name in ("video", "button", "input"))
+TOGGLE = f"const film = {VIDEO}; film.paused ? film.play() : film.pause()"
+SEEK = f"const film = {VIDEO}; film.pause(); film.currentTime = this.value * film.duration"
+SAY = f"{BUTTON}.textContent = this.paused ? 'Play' : 'Pause'"
+MOVE = f"{SLIDER}.value = this.currentTime / this.duration"
 STYLE = """<style>
 .film { margin: .5rem 0 } .film video, .film img { width: 100%; display: block }
 .film video { image-rendering: pixelated }
 .film figcaption { display: flex; gap: .3rem; text-align: center }
 .film figcaption span { flex: 1 1 0 }
-@media not print { .film .still { display: none } } @media print { .film video { display: none } }
+.film .bar { display: flex; gap: .5rem; margin-top: .3rem }
+.film button { min-width: 4.5rem } .film input { flex: 1; min-width: 0 }
+@media not print { .film .still { display: none } }
+@media print { .film video, .film .bar { display: none } }
 </style>"""
 
 
@@ -80,7 +90,11 @@ class Film:
             f'{STYLE}<figure class="film" style="max-width: {wide}px">'
             f"<figcaption>{names}</figcaption>"
             f'<video src="{data_uri("video/webm", self.webm())}" aria-label="{escape(said)}" '
-            f'autoplay loop muted playsinline controls onloadeddata="{CALM}"></video>'
+            f'autoplay loop muted playsinline onloadeddata="{CALM}" onclick="{TOGGLE}" '
+            f'onplay="{SAY}" onpause="{SAY}" ontimeupdate="{MOVE}"></video>'
+            f'<div class="bar"><button type="button" onclick="{TOGGLE}">Pause</button>'
+            '<input type="range" min="0" max="1" step="any" value="0" aria-label="Moment of the '
+            f'film" oninput="{SEEK}"></div>'
             f'<img class="still" src="{still}" alt="{escape(said)}"></figure>'
         )
 

@@ -1,5 +1,6 @@
 """Films side by side, and the diagram of the method: what they hold, frame by frame."""
 
+import asyncio
 import base64
 import io
 import re
@@ -11,6 +12,7 @@ from PIL import Image
 
 from lbw_minimal import diagram
 from lbw_minimal.films import Film, side_by_side
+from tests import browser
 
 
 def shades(*values, side=84):
@@ -45,9 +47,55 @@ def test_a_film_says_what_it_shows_can_be_stopped_and_is_a_picture_on_paper():
     html = Film({"<one>": shades(0, 9), "two": shades(9)}).html()
     tag = re.search(r"<video src=\"[^\"]+\"([^>]*)>", html)[1]
     assert 'aria-label="A film of &lt;one&gt;, two"' in tag and "prefers-reduced-motion" in tag
-    assert {"autoplay", "loop", "muted", "playsinline", "controls"} <= set(tag.split())
+    assert {"autoplay", "loop", "muted", "playsinline"} <= set(tag.split())
+    assert not re.search(r"\bcontrols\b", tag)  # they would cover the film
     assert html.count('<img class="still"') == 1 == html.count('alt="A film of &lt;one&gt;, two"')
     assert "http" not in html
+
+
+HOW = """
+(() => {
+  const film = document.querySelector("video"), slider = document.querySelector(".film input");
+  const [a, b] = [film, slider].map(e => e.getBoundingClientRect());
+  return [film.paused, document.querySelector(".film button").textContent, b.top >= a.bottom];
+})()
+"""
+SEEK = """
+(async () => {
+  const film = document.querySelector("video"), slider = document.querySelector(".film input");
+  const done = new Promise(done => film.addEventListener("seeked", done, {once: true}));
+  slider.value = 0.5;
+  slider.dispatchEvent(new Event("input"));
+  await done;
+  return [film.paused, film.currentTime, +slider.value];
+})()
+"""
+
+
+async def watch(folder):
+    """The film as it begins, stopped and run again by its button and by a tap, and at its half."""
+    said, click = [], "document.querySelector('{}').click()"
+    async with browser.opened(folder / "film.html", folder / "profile") as page:
+        for what in (None, ".film button", ".film button", "video", "video"):
+            if what:
+                await page.js(click.format(what))
+            for _ in range(50):  # until its event has come
+                now = await page.js(HOW)
+                if now[1] == ("Play" if now[0] else "Pause"):
+                    break
+                await asyncio.sleep(0.1)
+            said.append(now)
+        return said, await page.js(SEEK)
+
+
+def test_a_film_is_controlled_below_its_picture(tmp_path_factory):
+    """Sixteen frames and a rest at 12.5 a second: 1.28 s and 1 s."""
+    html = Film({"a": shades(*range(0, 160, 10))}, fps=12.5).html()
+    said, sought = browser.seen(
+        tmp_path_factory, lambda folder: (folder / "film.html").write_text(html), watch
+    )
+    assert said == [[p, "Play" if p else "Pause", True] for p in (0, 1, 0, 1, 0)]
+    assert sought == [True, pytest.approx(1.14, abs=0.1), pytest.approx(0.5, abs=0.05)]
 
 
 def test_a_readmes_film_keeps_every_frame_loops_and_rests():

@@ -66,7 +66,7 @@ code { background: var(--panel); padding: .1rem .3rem; border-radius: 4px }
 <p>{what}</p>
 <div class="stage">
 <video id="live" autoplay muted playsinline aria-label="The camera's picture"></video>
-<video id="film" controls loop playsinline hidden aria-label="What was recorded"></video>
+<video id="film" loop playsinline hidden aria-label="What was recorded"></video>
 <svg viewBox="0 0 {size} {size}" role="img"
  aria-label="Outline of the scene">
 {outlines}
@@ -180,11 +180,13 @@ function show(blob, name) {
   at("film").play();
   Object.assign(at("save"), {href: url, download: name});
   at("clip").textContent = name;
-  state("recorded", `Recorded, ${(blob.size / 1e6).toFixed(1)} MB. Look at it, then save it.`);
+  const size = (blob.size / 1e6).toFixed(1);
+  state("recorded", `Recorded, ${size} MB. Look at it, a tap stops it, and save it.`);
 }
 
 at("record").onclick = record;
 at("stop").onclick = () => recorder.stop();
+at("film").onclick = () => at("film").paused ? at("film").play() : at("film").pause();
 at("again").onclick = () => stream ? state("live") : location.reload();
 at("cameras").onchange = event => start(event.target.value);
 at("shown").oninput = event =>
