@@ -1,6 +1,7 @@
 """The meshcat mirror: what the browser is told equals what PyBullet knows, and nothing listens
 anywhere."""
 
+import asyncio
 import base64
 import re
 import socket
@@ -15,8 +16,10 @@ import pybullet_data
 import pytest
 import umsgpack
 
+import tasks
 from tasks.world.meshes import normals, read_mesh
-from tasks.world.viewer import Recorder, transform
+from tasks.world.viewer import FOV, Recorder, mirror, transform
+from tests import browser
 
 PANDA = Path(pybullet_data.getDataPath()) / "franka_panda" / "panda.urdf"
 
@@ -357,3 +360,55 @@ def test_edges_are_shaded_sharp_and_round_surfaces_round():
         small_and_far = 0.001 * corners + (1000, 0, 0)
         np.testing.assert_allclose(normals(small_and_far), n, atol=1e-6)
     np.testing.assert_allclose(n[0], [[0, 0, 1]] * 3, atol=1e-12)
+
+
+VIEW = """
+(() => {
+  viewer.render();
+  const foot = viewer.camera.position.clone().set(0, 0, 0).project(viewer.camera);
+  return [viewer.camera.fov, foot.x];
+})()
+"""
+ON_PAPER = """
+(() => {
+  dispatchEvent(new Event("beforeprint"));
+  const paper = document.getElementById("paper");
+  const {data} = paper.getContext("2d").getImageData(0, 0, paper.width, paper.height);
+  const all = [...Array(data.length / 4).keys()].map(i => [...data.slice(4 * i, 4 * i + 3)]);
+  return [paper.width, all.filter(([r, g, b]) => r > 150 && g < 60 && b < 60).length];
+})()
+"""
+SHOWN = '["scene", "paper"].map(id => getComputedStyle(document.getElementById(id)))'
+SHOWN += ".map(style => style.display !== 'none' && style.visibility !== 'hidden')"
+
+
+async def look(folder):
+    """The camera's angle and where it sees the foot of the arm, wide and upright; then on paper."""
+    seen, flags = {}, ("--hide-scrollbars", "--enable-unsafe-swiftshader")
+    async with browser.opened(folder / "scene.html", folder / "profile", *flags) as page:
+        for width, height in ((1400, 900), (390, 844)):
+            size = {"width": width, "height": height, "deviceScaleFactor": 1}
+            await page.call("Emulation.setDeviceMetricsOverride", mobile=False, **size)
+            await page.until("innerWidth", width)
+            await asyncio.sleep(0.5)  # until the viewer has taken the new size
+            seen[width] = await page.js(VIEW)
+        seen["paper"] = await page.js(ON_PAPER)
+        seen["screen"] = await page.js(SHOWN)
+        await page.call("Emulation.setEmulatedMedia", media="print")
+        seen["print"] = await page.js(SHOWN)
+    return seen
+
+
+def test_a_scene_is_whole_upright_on_a_phone_and_a_picture_on_paper(tmp_path_factory):
+    def write(folder):
+        env = tasks.bare("push")
+        env.reset(seed=0)
+        mirror(env).save(folder / "scene.html")
+        env.close()
+
+    seen = browser.seen(tmp_path_factory, write, look)
+    assert seen[1400][0] == pytest.approx(FOV) and seen[390][0] > FOV
+    assert -0.9 < seen[1400][1] < -0.4 and -0.9 < seen[390][1] < -0.4  # -1 is the left edge
+    width, red = seen["paper"]  # the cube's pixels
+    assert width == 390 and 100 < red < 1000
+    assert seen["screen"] == [True, False] and seen["print"] == [False, True]

@@ -36,6 +36,9 @@ from tasks.world.scene import Vector, World
 EYE, TARGET = (0.5, -1.2, 0.45), (0.42, 0.0, 0.22)
 # degrees, from bottom to top: the whole arm, where the environments' camera frames the skill
 FOV = 46
+# Width by height of the narrowest picture that shows the arm from its base on at that angle. On a
+# screen that is narrower, as a phone's, the angle is as much larger.
+NARROWEST = 1.2
 # turned by 90 degrees about x
 Y_TO_Z = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1.0]])
 
@@ -45,10 +48,15 @@ PAGE = """<!DOCTYPE html>
 <meta charset="utf-8">
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <title>{title}</title>
-<style>body {{ margin: 0 }} #scene {{ width: 100vw; height: 100vh; overflow: hidden }}</style>
+<style>
+body {{ margin: 0 }} #scene {{ width: 100vw; height: 100vh; overflow: hidden }}
+#paper {{ display: none; max-width: 100%; max-height: 95vh; margin: auto }}
+@media print {{ #scene {{ height: 0; visibility: hidden }} #paper {{ display: block }} }}
+</style>
 </head>
 <body>
 <div id="scene"></div>
+<canvas id="paper" role="img" aria-label="{title}"></canvas>
 <script>
 /* meshcat: Copyright (c) 2018 Robin Deits, MIT License. With it: */
 {notices}
@@ -58,11 +66,23 @@ PAGE = """<!DOCTYPE html>
 const pane = document.getElementById("scene"), viewer = new MeshCat.Viewer(pane);
 for (const command of {commands})
   viewer.handle_command_bytearray(Uint8Array.from(atob(command), c => c.charCodeAt(0)));
-viewer.camera.fov = {fov};
+const fit = () => {{
+  const more = Math.max(1, {narrowest} * innerHeight / innerWidth), half = {fov} * Math.PI / 360;
+  viewer.camera.fov = 360 / Math.PI * Math.atan(more * Math.tan(half));
+  viewer.set_dirty();
+}};
+addEventListener("resize", fit);
+fit();
 viewer.camera.position.set({eye});
 viewer.controls.target.set({target});
 viewer.controls.maxPolarAngle = Math.PI / 2;  // from below one sees the table only
 viewer.controls.update();
+addEventListener("beforeprint", () => {{  // a picture drawn by the graphics card is blank on paper
+  const paper = document.getElementById("paper"), seen = viewer.renderer.domElement;
+  [paper.width, paper.height] = [seen.width, seen.height];
+  viewer.render();
+  paper.getContext("2d").drawImage(seen, 0, 0);
+}});
 if (window !== top) {{  // in another page the wheel scrolls that page, until one clicks here
   viewer.controls.enableZoom = false;
   pane.addEventListener("pointerdown", () => viewer.controls.enableZoom = true);
@@ -210,6 +230,7 @@ class Recorder:
             meshcat=(dist / "main.min.js").read_text(encoding="utf-8"),
             commands=[base64.b64encode(pack(c)).decode() for c in tape],
             fov=FOV,
+            narrowest=NARROWEST,
             eye=y_up(self.eye),
             target=y_up(self.target),
         )
