@@ -25,7 +25,7 @@ SUCCESS = 0.05  # m, distance from cube to target: Fetch's `distance_threshold`
 
 class Push(TaskEnv):
     __doc__ = __doc__
-    GOAL = f"the cube's centre gets to within {100 * SUCCESS:g} cm of the target's"
+    GOAL = f"the cube's centre gets to within {100 * SUCCESS:g} cm of the green disc's"
     CONTACT = CUBE / 2 + FINGER
 
     def furnish(self) -> None:

@@ -32,7 +32,7 @@ STROKE, STROKE_TIME = 0.174, 0.40  # m, s: the expert's hit
 
 class Slide(TaskEnv):
     __doc__ = __doc__
-    GOAL = f"the puck comes to rest within {100 * SUCCESS:g} cm of the target's centre"
+    GOAL = f"the puck comes to rest within {100 * SUCCESS:g} cm of the green disc's centre"
     CAMERA = ((0.71, 0.0, 0.20), 1.58)  # m: 70 cm fill the image
     # m: 1 m/s at full action. Slower up and down: landing on the puck at 0.6 m/s turns the robot's
     # wrist faster than twice its rated speed.

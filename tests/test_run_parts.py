@@ -162,7 +162,7 @@ def test_the_result_is_a_line_with_wins_and_their_interval(tmp_path, monkeypatch
         and page["demo"] == "d"
         and page["episode"] == {"frames": "f"}
     )
-    assert page["goal"] == "the cube's centre gets to within 5 cm of the target's"
+    assert page["goal"] == "the cube's centre gets to within 5 cm of the green disc's"
     assert (page["scene_html"], page["command"]) == ("<scene>", "python -m tasks push")
     (job.run.out / "policy_log.json").write_text(json.dumps([{"step": 1}]))
     write_stills(job.run.out / "stills.webp", np.zeros((3, 8, 8, 3), np.uint8))
