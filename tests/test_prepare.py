@@ -85,7 +85,12 @@ def test_what_is_not_usable_ends_with_2_and_a_page_that_says_why(filmed, eyes, t
     assert main(["prepare", "push", str(filmed[0]), "--out", str(tmp_path)]) == 2
     assert capfd.readouterr().out.startswith("not usable: the tip of the hand is seen in 0%")
     page = (tmp_path / "prepare.html").read_text()
-    assert "Push: not usable" in page and "film from the side" in page and "data-time=" in page
+    assert (
+        "Push: not usable" in page
+        and "<p>The tip of the hand is seen" in page
+        and "film from the side" in page
+        and "data-time=" in page
+    )
     assert not (tmp_path / "reenactment.mp4").exists()
 
 

@@ -83,7 +83,8 @@ def write_page(
     keypoints (n, K, 2). links: HTML that leads to other pages. learn: the command that comes next.
     """
     head, _, rest = verdict.partition(": ")
-    page = [f"<h1>{escape(task).capitalize()}: {escape(head)}</h1>", f"<p>{escape(rest)}</p>"]
+    why = escape(rest[:1].upper() + rest[1:])
+    page = [f"<h1>{escape(task).capitalize()}: {escape(head)}</h1>", f"<p>{why}</p>"]
     page += [f'<p class="note">{escape(warning)}</p>' for warning in warnings]
     if columns and shown is not None:
         seen = clip_column(frames, times, tracks, motion, shown)

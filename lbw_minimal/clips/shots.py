@@ -57,8 +57,8 @@ CUT = """
 </p>
 """
 ONLY_CUT = """
-<p>Nothing was looked for in these pictures. If a part of the clip is as it should be, choose the
-first and then the last picture of it, click them, and run the command below.</p>
+<p>Hand and object were not even looked for in this clip. If a part of it is as it should be, choose
+the first and then the last picture of that part, click them, and run the command below.</p>
 """
 CHOICES = {  # by the option that a click writes
     "tip": f"{_dot(TIP)} tip",
