@@ -7,7 +7,8 @@ PYTHON ?= $(shell for p in python3 python3.11 python3.12 python3.13 python; do \
     $$p -c '$(PROMISED)' 2>/dev/null && echo $$p && break; done)
 # The exact set that the results were made with; `make push LOCK=` takes the newest releases instead.
 LOCK ?= -c requirements-lock.txt
-# An index of PyTorch's CPU builds, see README; without one pip takes what it takes by default.
+# An index of PyTorch's CPU builds, see README; without one pip takes what it takes by default. It
+# gives torch alone, since it need not have the lock's versions of what torch depends on.
 TORCH_INDEX ?=
 PIP = $(BIN)/python -m pip install --disable-pip-version-check
 
@@ -87,7 +88,7 @@ $(VENV)/ready: requirements.txt requirements-lock.txt
 	$(PYTHON) -m venv $(VENV)
 ifneq ($(TORCH_INDEX),)
 	@echo "PyTorch from $(TORCH_INDEX): 0.2 GB for a CPU build."
-	$(PIP) $(LOCK) torch --index-url $(TORCH_INDEX)
+	$(PIP) --no-deps $(LOCK) torch --index-url $(TORCH_INDEX)
 else
 	@echo "PyTorch: on Linux pip's default brings CUDA, 2.7 GB to download, some minutes;" \
 	    "README says how to take a CPU build, 0.2 GB."
