@@ -1,5 +1,9 @@
 """Sliders and curves of the notebooks: what is shown with a kernel, without one, and on the way."""
 
+import base64
+import re
+from types import SimpleNamespace
+
 import gymnasium as gym
 import ipywidgets
 import nbformat
@@ -39,6 +43,28 @@ def test_where_no_kernel_answers_some_settings_stand_side_by_side():
     assert [row["a"] for row in log[1:]] == [0, 3, 6, 9]
     assert {WIDGET, "image/png"} <= set(data) and data["image/png"].startswith(b"\x89PNG")
     assert said["image/png"]["alt"] == "One drawing for each of a 0; a 3; a 6; a 9."
+
+
+def size(png):
+    """Width and height in pixels, from the head of a PNG."""
+    return tuple(np.frombuffer(png[16:24], ">u4").tolist())
+
+
+def test_a_drawing_has_96_pixels_an_inch_and_the_one_that_is_turned_half_as_many_again():
+    sliders = Sliders(noted([]), {"a": range(10)}, size=(2.0, 1.0))
+    data, _ = sliders._repr_mimebundle_()
+    assert size(data["image/png"]) == (4 * 2 * 96, 96)
+    (turned,) = re.findall('base64,([^"]+)', sliders.image.value)
+    assert size(base64.b64decode(turned)) == (1.5 * 2 * 96, 1.5 * 96)
+    wide, high = size(Sliders(noted([]), {"a": range(10)})._repr_mimebundle_()[0]["image/png"])
+    assert wide == pytest.approx(4 * high, abs=4)  # each is a square
+
+
+def test_curves_have_a_grid_to_read_them_by_and_a_drawing_has_none():
+    for figure, there in (
+        (Curves("x", "y").figure(), True), (Sliders(noted([]), {"a": (1,)}).figure([{}]), False)
+    ):  # fmt: skip
+        assert figure.axes[0].get_xgridlines()[0].get_visible() == there
 
 
 def test_two_sliders_have_to_be_told_what_the_strip_shows():
@@ -87,9 +113,36 @@ def test_curves_keep_every_point_and_are_drawn_no_oftener_than_asked(monkeypatch
     np.testing.assert_array_equal(line.get_xydata(), [(t, -t) for t in (1.0, 2.0, 3.5, 4.0)])
 
 
-class Three(gym.Env):
-    """Episodes of three steps, each of which pays 2."""
+def test_a_growing_curve_is_one_drawing_that_is_shown_anew_every_two_seconds(monkeypatch):
+    now, shown = [0.0], []
+    handle = SimpleNamespace(update=shown.append)
+    monkeypatch.setattr(play, "display", lambda figure, display_id: shown.append(figure) or handle)
+    monkeypatch.setattr(play.time, "monotonic", lambda: now[0])
+    curves = Curves("step", "return")
+    for now[0] in (1.0, 2.0, 2.9, 3.1, 4.0):
+        curves.add("a", now[0], 0)
+    curves.show()
+    assert [len(figure.axes[0].lines[0].get_xdata()) for figure in shown] == [1, 4, 5]
 
+
+def test_curves_bear_their_names_and_colours_and_one_alone_has_no_legend():
+    curves = Curves("step", "return", every=np.inf)
+    curves.add("a", 0, 1)
+    (axis,) = curves.figure().axes
+    assert (axis.get_xlabel(), axis.get_ylabel()) == ("step", "return")
+    assert axis.get_legend() is None
+    for name in "bcdef":
+        curves.add(name, 0, 1)
+        (axis,) = curves.figure().axes
+        names = "abcdef"[: 1 + "abcdef".index(name)]
+        assert [text.get_text() for text in axis.get_legend().get_texts()] == [*names]
+    assert len({line.get_color() for line in axis.lines}) == 6
+
+
+class Three(gym.Env):
+    """Episodes of three steps, each of which pays 2. ends: which of the two flags says so."""
+
+    ends = (False, True)  # terminal, truncated
     observation_space = action_space = gym.spaces.Discrete(2)
 
     def reset(self, *, seed=None, options=None):
@@ -98,7 +151,7 @@ class Three(gym.Env):
 
     def step(self, action):
         self.left -= 1
-        return 0, 2, False, self.left == 0, {}
+        return 7, 2, *(self.left == 0 and flag for flag in self.ends), {"left": self.left}
 
 
 def test_episodes_of_the_training_are_told_and_those_after_it_are_not():
@@ -109,6 +162,17 @@ def test_episodes_of_the_training_are_told_and_those_after_it_are_not():
         while not env.step(0)[3]:
             pass
     assert told == [(3, 6.0), (6, 6.0)] and env.steps == 12
+
+
+@pytest.mark.parametrize("ends", [(True, False), (False, True)])
+def test_an_episode_is_told_however_it_ends_and_nothing_of_a_step_is_changed(ends, monkeypatch):
+    monkeypatch.setattr(Three, "ends", ends)
+    told = []
+    env = Told(Three(), lambda *what: told.append(what), 5)
+    env.reset()
+    steps = [env.step(0) for _ in range(3)]
+    assert steps[0] == (7, 2, False, False, {"left": 2}) and steps[2] == (7, 2, *ends, {"left": 0})
+    assert told == [(3, 6.0)]
 
 
 def test_a_slider_can_be_used_by_its_keys_and_says_its_name():
