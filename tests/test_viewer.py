@@ -17,8 +17,9 @@ import pytest
 import umsgpack
 
 import tasks
-from tasks.world.meshes import normals, read_mesh
-from tasks.world.viewer import FOV, Recorder, mirror, transform
+from tasks import TASKS, bare
+from tasks.world.meshes import normals, read_mesh, read_obj
+from tasks.world.viewer import FOV, Recorder, drawing, mirror, transform
 from tests import browser
 
 PANDA = Path(pybullet_data.getDataPath()) / "franka_panda" / "panda.urdf"
@@ -246,6 +247,34 @@ def test_every_shape_keeps_its_colour(client):
     assert [(m["opacity"], m["transparent"]) for m in paint[:2]] == [(1, False), (0.5, True)]
 
 
+def test_a_colour_is_written_as_red_green_and_blue_to_the_nearest_of_256(client):
+    look = p.createVisualShape(p.GEOM_SPHERE, radius=0.1, rgbaColor=(0.251, 0.4, 0.749, 0.3),
+                               physicsClientId=client)  # fmt: skip
+    p.createMultiBody(0, -1, look, physicsClientId=client)
+    ((*_, paint),) = played(Recorder(client).html("x"), 0)
+    assert (paint["color"], paint["opacity"]) == (0x4066BF, pytest.approx(0.3))
+
+
+def test_a_mesh_is_drawn_as_large_as_its_scale_says():
+    text = "v 0 0 0\nv 1 0 0\nv 0 1 1\nf 1 2 3\n"
+    ((mesh, at),) = drawing(p.GEOM_MESH, (2.0, 3.0, 4.0), "/gone/a.obj", {"a.obj": text})
+    np.testing.assert_array_equal(mesh.corners, [[[0, 0, 0], [2, 0, 0], [0, 3, 4]]])
+    np.testing.assert_array_equal(at, np.eye(4))
+
+
+def test_a_shape_it_cannot_draw_is_named():
+    with pytest.raises(ValueError, match=f"cannot draw a shape of PyBullet's type {p.GEOM_PLANE}"):
+        drawing(p.GEOM_PLANE, (1.0, 1.0, 1.0), "", {})
+
+
+def test_the_page_shows_the_scene_alone(client):
+    """meshcat's own grid would lie in the table's top."""
+    primitives(client)
+    told = commands(Recorder(client).html("x"))
+    hidden = {c["path"] for c in told if c.get("property") == "visible" and c["value"] is False}
+    assert hidden == {"/Grid", "/Axes"}
+
+
 def test_nothing_listens_and_nothing_is_started(client, monkeypatch):
     def refuse(*args, **kwargs):
         raise AssertionError("a socket or a process")
@@ -282,6 +311,19 @@ def test_the_animation_repeats_for_ever_at_the_frame_rate_asked_for(client):
     clip = animation["animations"][0]["clip"]
     # three frames, then a second's rest
     assert clip["fps"] == 10 and [k["time"] for k in clip["tracks"][0]["keys"]] == [0, 1, 2, 12]
+
+
+def test_what_turns_on_the_spot_is_animated_at_25_frames_a_second_unless_asked(client, tmp_path):
+    body = primitives(client)
+    recorder = Recorder(client)
+    for _ in range(2):
+        recorder.snap()
+        p.resetJointState(body, 0, 0.5, physicsClientId=client)
+    told = commands(recorder.html("x"))
+    ((part,),) = (c["animations"] for c in told if c["type"] == "set_animation")
+    assert part["path"].endswith(f"/{body}/0") and part["clip"]["fps"] == 25
+    recorder.save(tmp_path / "a.html", "a title", fps=10)
+    assert (tmp_path / "a.html").read_text() == recorder.html("a title", fps=10)
 
 
 def test_only_the_bodies_asked_for_are_recorded(client):
@@ -329,6 +371,72 @@ def test_on_paper_a_notebook_shows_a_picture_of_the_scene():
     assert "<iframe" in recorder._repr_html_() and "<img" not in recorder._repr_html_()
 
 
+@pytest.fixture(scope="module")
+def mirrored():
+    """All tasks' scenes, mirrored."""
+    envs = {(name, arm): bare(name, embodiment=arm) for name in TASKS for arm in ("robot", "human")}
+    for env in envs.values():
+        env.reset(seed=0)
+    yield {which: (env, mirror(env)) for which, env in envs.items()}
+    for env in envs.values():
+        env.close()
+
+
+def test_one_sees_the_whole_arm_and_no_more_than_that_takes(mirrored):
+    """In angles up and to the side from where one looks from; the picture is 16 to 9."""
+    highest = widest = 0.0
+    for env, scene in mirrored.values():
+        ahead, side, up = basis(scene.eye, scene.target)
+        arm, pybullet = env.arm, env.world.p
+        points = [
+            *(pybullet.getLinkState(arm.body, i, computeForwardKinematics=True)[4]
+              for i in arm.links.values()),
+            *(env.object_position(), env.target_position(), *env.WORKSPACE),
+        ]  # fmt: skip
+        seen = np.array(points) - scene.eye
+        highest = max(highest, np.degrees(np.arctan(abs(seen @ up) / (seen @ ahead))).max())
+        widest = max(widest, (abs(seen @ side) / (seen @ ahead)).max())
+    assert 0.8 * FOV / 2 < highest < FOV / 2
+    assert widest < 16 / 9 * np.tan(np.radians(FOV / 2))
+
+
+def basis(eye, target):
+    """Unit vectors ahead, to the right and up of one who looks from `eye` at `target`."""
+    ahead = np.subtract(target, eye)
+    side = np.cross(ahead, (0, 0, 1))
+    return [v / np.linalg.norm(v) for v in (ahead, side, np.cross(side, ahead))]
+
+
+def test_one_stands_as_far_off_and_as_far_aside_as_the_tasks_camera(mirrored):
+    """Slide's camera, 1.58 m off and at 0.71 m along x; the others', 1.15 m and 0.56 m."""
+    for (name, _), (_, scene) in mirrored.items():
+        wider, aside = (1.58 / 1.15, 0.15) if name == "slide" else (1, 0)
+        eye = 0.5 + aside, -1.2 * wider, 0.45 * wider
+        assert scene.eye == pytest.approx(eye)
+        assert scene.target == pytest.approx((0.42 + aside, 0, 0.22))
+
+
+def test_the_page_looks_from_where_the_picture_does_with_its_y_axis_up(mirrored):
+    _, scene = mirrored["slide", "robot"]
+    page = scene.html("x")
+    for what, (x, y, z) in (("camera.position", scene.eye), ("controls.target", scene.target)):
+        (told,) = re.findall(rf"viewer\.{what}\.set\((.*?)\)", page)
+        assert [float(n) for n in told.split(",")] == pytest.approx([x, z, -y])
+    assert f"viewer.camera.fov = {FOV};" in page
+
+
+def test_a_picture_of_a_tasks_scene_shows_its_table_and_leaves_it_as_it_was(mirrored):
+    """The table's brown is seen about the picture's middle, where the target of the eye is."""
+    env, scene = mirrored["push", "human"]
+    before = env.world.render()
+    picture = cv2.imdecode(np.frombuffer(scene.picture(), np.uint8), cv2.IMREAD_COLOR)
+    np.testing.assert_array_equal(env.world.render(), before)
+    red, blue = picture[240:, 200:440, 2].astype(int), picture[240:, 200:440, 0].astype(int)
+    assert (red - blue > 25).mean() > 0.5
+    paint = [material for *_, material in played(scene.html("x"), 0)]
+    assert min(material["opacity"] for material in paint) == 1  # the page shows it, too
+
+
 def test_stl_and_obj_give_the_same_triangles(tmp_path):
     corners = np.array(
         [[[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 0, 0], [0, 1, 0], [-1, 0, 0]]], "<f4"
@@ -347,6 +455,39 @@ def test_a_mesh_it_cannot_read_is_named(tmp_path, name, data):
     (tmp_path / name).write_bytes(data)
     with pytest.raises(ValueError, match=name):
         read_mesh(tmp_path / name)
+
+
+def test_files_from_elsewhere_are_read(tmp_path):
+    """A comment in Latin 1, capitals, a colour to each vertex, and other numbers for textures."""
+    rows = "v 0 0 0 1 1 1\nv 1 0 0 1 1 1\nv 0 1 0 1 1 1\nvt 0 0\nvn 0 0 1\nf 3/1/1 1/1/1 2/1/1\n"
+    path = tmp_path / "A.OBJ"
+    path.write_bytes("# für\n".encode("latin-1") + rows.encode())
+    corners = [[[0, 1, 0], [0, 0, 0], [1, 0, 0]]]
+    np.testing.assert_array_equal(read_mesh(path), corners)
+    np.testing.assert_array_equal(read_obj(rows), corners)
+    data = b"\0" * 12 + np.array(corners, "<f4").tobytes() + b"\0\0"
+    (tmp_path / "A.STL").write_bytes(b" " * 80 + np.uint32(1).tobytes() + data)
+    np.testing.assert_array_equal(read_mesh(tmp_path / "A.STL"), corners)
+
+
+def test_a_round_surface_bends_by_less_than_40_degrees_and_large_faces_count_more():
+    """A square metre that lies, and half of one that is bent up by 39 or 41 degrees."""
+    for bend, smooth in ((39, True), (41, False)):
+        c, s = np.cos(np.radians(bend)), np.sin(np.radians(bend))
+        left = [[0, 0, 0], [0, 1, 0], [-2, 0, 0]]
+        right = [[0, 0, 0], [c, 0, s], [0, 1, 0]]
+        n = normals(np.array([left, right], float))
+        mean = 2 * np.array([0, 0, 1.0]) + (-s, 0, c) if smooth else np.array([0, 0, 1.0])
+        np.testing.assert_allclose(n[0, :2], [mean / np.linalg.norm(mean)] * 2, atol=1e-9)
+        np.testing.assert_allclose(n[0, 2], (0, 0, 1), atol=1e-9)  # where nothing is bent
+
+
+def test_corners_a_thousandth_apart_are_two():
+    """Of a thing of 1 m; each keeps the direction of its own face."""
+    flat = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], float)
+    tilted = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.3]]) + (0, 0, 0.001)
+    n = normals(np.array([flat, tilted]))
+    np.testing.assert_allclose(n[0], [(0, 0, 1)] * 3, atol=1e-9)
 
 
 def test_edges_are_shaded_sharp_and_round_surfaces_round():
