@@ -1,6 +1,7 @@
 """The command line: what a user does wrong gets one sentence, exit code 2, and leaves no trace."""
 
 import json
+import re
 import shutil
 
 import cv2
@@ -268,6 +269,27 @@ def test_no_command_prints_the_tasks_and_three_commands_to_try(capfd):
     tried = out.partition("try first:")[2]
     assert all(f"  {name} " in out for name in (*TASKS, *commands.COMMANDS))
     assert tried.count("python -m tasks ") == 4  # three, and how to read of options
+
+
+def test_the_overview_says_what_each_task_is_about_and_offers_lines_that_are_understood(capfd):
+    """The first sentence of a task's file; "reach" is to be told from the others by it."""
+    assert main(["-h"]) == main(["--help"]) == 0
+    out = capfd.readouterr().out
+    assert "\n  push       Push: a cube lies on the table, and its centre has to end at " in out
+    assert "\n  reach      Reach: a target hangs over the table, and " in out
+    assert "write runs/TASK/report.html\n" in out
+    for line in re.findall("^  python -m tasks (.*?)  ", out.partition("try first:")[2], re.M):
+        name, *rest = line.split()
+        (parser(name) if name in TASKS else PARSERS[name]).read(rest)
+
+
+def test_a_command_says_by_its_exit_code_how_it_went(monkeypatch, capfd):
+    for answer, code in ((None, 0), (0, 0), (3, 3)):
+        monkeypatch.setattr("tasks.commands.probe.main", lambda rest, answer=answer: answer)
+        assert main(["probe"]) == code
+    assert main(["pish"]) == 2
+    told = capfd.readouterr().err
+    assert all(name in told for name in (*TASKS, *commands.COMMANDS))
 
 
 @pytest.mark.usefixtures("one_trial")

@@ -10,6 +10,7 @@ import pytest
 import tasks
 from lbw_minimal import classifier, cyclegan, rivals, sac_ae
 from lbw_minimal.imitate import Recipe, Run
+from lbw_minimal.training import InputError
 from tasks.__main__ import main
 from tasks.commands import job
 from tasks.commands.job import parser
@@ -107,6 +108,10 @@ def test_the_clip_of_the_recipe_bounds_the_reward():
     env.reset(seed=0)
     _, reward, *_, info = env.step(np.zeros(3, np.float32))
     assert reward == 1.0 and info["reward_parts"]["logit"] > 5
+    env = rivals.watched(reach(), model)  # by default a logit of 10 earns 1
+    env.reset(seed=0)
+    _, reward, *_, info = env.step(np.zeros(3, np.float32))
+    assert reward == pytest.approx(info["reward_parts"]["logit"] / 10)
 
 
 @pytest.mark.parametrize("motion", [False, True])
@@ -114,7 +119,7 @@ def test_each_stage_of_a_rival_takes_the_recipes_numbers(motion, tmp_path, monke
     given = {}
 
     def trains(name, result):
-        return lambda *a, **k: given.update({name: (a, k)}) or (result, [])
+        return lambda *a, **k: given.update({name: (a, k)}) or (result, [{"of": name}])
 
     model = classifier.GoalClassifier()
     monkeypatch.setattr(cyclegan, "train", trains("G", cyclegan.CycleGAN(2, 1)))
@@ -129,19 +134,50 @@ def test_each_stage_of_a_rival_takes_the_recipes_numbers(motion, tmp_path, monke
     )  # fmt: skip
     experts = [film(20, 60), film(30, 61), film(25, 62)]
     run = run_in(tmp_path)
-    policy, env = rivals.avid_m(reach(), experts, film(6), film(8), recipe, run=run, **ARGS)
+    policy, env = rivals.avid_m(
+        reach(), experts, film(6), film(8), recipe, run=run, task="reach", seed=4, device="there"
+    )
     assert policy == "agent" and env.get_wrapper_attr("classifier_reward").clip == 3.0
     options = {name: given[name][1] for name in given}
     for name, asked in {
-        "G": {"iterations": 11, "width": 12, "motion": motion, "seed": 0},
-        "D": {"iterations": 13, "seed": 0},
-        "policy": {"steps": 14, "updates": 15, "hold": 16, "entropy": -1.75, "seed": 0},
+        "G": {"iterations": 11, "width": 12, "motion": motion},
+        "D": {"iterations": 13},
+        "policy": {"steps": 14, "updates": 15, "hold": 16, "entropy": -1.75},
     }.items():
+        asked |= {"seed": 4, "device": "there"}
         assert asked == {field: options[name][field] for field in asked}
+    for name, stage in {"G": "translation", "D": "classifier", "policy": "policy"}.items():
+        assert options[name]["checkpoint"].path == tmp_path / f"{stage}.checkpoint"
+        assert json.loads((tmp_path / f"{stage}_log.json").read_text()) == [{"of": name}]
     positive, negative = given["D"][0]
     # The last tenths, 2, 3 and 3 frames; of no random motion any negative.
     assert (len(positive), len(negative)) == (8, 18 + 27 + 22)
     assert classifier.load(tmp_path / "classifier.safetensors").longest == 30
+
+
+def test_the_classifier_reward_hands_all_it_was_given_on(tmp_path, monkeypatch):
+    """Random motion to the negatives; seed and device to the trainings of both networks."""
+    given = {}
+
+    def trains(name, result):
+        return lambda *a, **k: given.update({name: (a, k)}) or (result, [])
+
+    monkeypatch.setattr(classifier, "train", trains("D", classifier.GoalClassifier()))
+    monkeypatch.setattr(sac_ae, "train", trains("policy", "agent"))
+    monkeypatch.setattr(sac_ae, "save", lambda path, agent: path.write_text(agent))
+    monkeypatch.setattr(sac_ae, "load", lambda path: path.read_text())
+    random, more = film(6, 200), {"task": "reach", "seed": 5, "device": "there"}
+    rivals.classifier_reward(reach(), [film(20)], random, TINY, run=run_in(tmp_path), **more)
+    (_, negative), options = given["D"]
+    np.testing.assert_array_equal(negative[-6:], random)
+    for k in (options, given["policy"][1]):
+        assert (k["seed"], k["device"]) == (5, "there")
+
+
+def test_a_rivals_policy_is_replayed_on_its_own_task_alone(tmp_path):
+    classifier.save(tmp_path / "classifier.safetensors", classifier.GoalClassifier(20), "push")
+    with pytest.raises(InputError, match="push"):
+        rivals.replayed(reach(), tmp_path, "reach")
 
 
 @pytest.mark.parametrize("method", ["classifier", "avid"])

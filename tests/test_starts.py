@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import tasks
-from lbw_minimal import imitate, video
+from lbw_minimal import imitate, video, wrappers
 from tasks import world
 from tasks.commands.recipe import fields_of
 from tasks.world import DT, SUBSTEPS, random_actions
@@ -287,13 +287,34 @@ def test_the_recipe_is_that_of_the_results(name):
         assert known == {key: ours[key] for key in known} and len(known) > 8
 
 
-def test_the_shipped_perception_has_watched_the_first_human_video(monkeypatch):
-    watched = []
+def test_the_shipped_perception_or_ones_own_has_watched_the_first_human_video(monkeypatch):
+    watched, asked = [], []
     perception = SimpleNamespace(watch=watched.append)
-    monkeypatch.setattr(imitate, "load_perception", lambda *where: (where, perception)[1])
+    monkeypatch.setattr(imitate, "load_perception", lambda *of: asked.append(of) or perception)
     monkeypatch.setattr(video, "read", lambda path: (path.relative_to(tasks.VIDEOS), []))
     assert tasks.trained_perception("slide") is perception
-    assert [path.as_posix() for path in watched] == ["slide/expert_01.mp4"]
+    assert tasks.trained_perception("slide", "mine") is perception
+    assert [path.as_posix() for path in watched] == 2 * ["slide/expert_01.mp4"]
+    assert asked == [(tasks.WEIGHTS / "slide", "slide"), ("mine", "slide")]
+
+
+def test_an_agent_from_elsewhere_gets_the_mended_reward_unless_it_asks_for_another(monkeypatch):
+    asked = []
+    monkeypatch.setattr(imitate, "load_perception", lambda *of: SimpleNamespace(detect=of))
+    monkeypatch.setattr(
+        wrappers, "KeypointObservation", lambda env, detect: asked.append(detect) or env
+    )
+    monkeypatch.setattr(tasks, "trained_perception", lambda name: name)
+    monkeypatch.setattr(tasks, "pace_film", lambda name: name)
+    monkeypatch.setattr(imitate, "watched", lambda env, *of: asked.append(of) or (env, None))
+    for reward in ((), ("literal",), (None,)):
+        tasks.keypoint_env("coffee", *reward).close()
+    assert asked[:2] == [("coffee", "coffee", "mended"), ("coffee", "coffee", "literal")]
+    assert asked[2] == (tasks.WEIGHTS / "coffee", "coffee")
+
+
+def test_in_reach_alone_nothing_is_moved():
+    assert [name for name in tasks.TASKS if not tasks.moves_object(name)] == ["reach"]
 
 
 def test_the_film_of_the_robots_pace_has_its_own_seed_and_400_frames(monkeypatch):
