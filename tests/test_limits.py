@@ -9,10 +9,13 @@ import sys
 
 import gymnasium as gym
 import numpy as np
+import pybullet
 import pytest
+import torch
 from gymnasium.error import ClosedEnvironmentError, InvalidAction, ResetNeeded, UnsupportedMode
 
 import tasks
+from tasks.world.scene import DT, FPS, SUBSTEPS
 
 SCENES = [(name, arm) for name in tasks.TASKS for arm in ("robot", "human")]
 FEW_OR_THOUSAND = [7, pytest.param(1000, marks=pytest.mark.slow)]  # one of each kind, or many
@@ -259,6 +262,52 @@ def test_environments_run_in_processes_that_gymnasium_spawns():
     assert envs.step(np.zeros((2, 3), np.float32))[0].shape == (2, 84, 84, 3)
     envs.close()
     alone.close()
+
+
+def test_a_copy_has_all_of_its_arguments():
+    given = {"embodiment": "human", "render_mode": "rgb_array", "observation": "state"}
+    env = tasks.module("reach").Reach(**given, jitter=0.01)
+    twin = pickle.loads(pickle.dumps(env))
+    for name, value in (given | {"jitter": 0.01}).items():
+        assert getattr(twin, name) == value, name
+    env.close(), twin.close()
+
+
+@pytest.mark.parametrize("observation", ["rgb", "state"])
+@pytest.mark.parametrize("name", tasks.TASKS)
+def test_what_is_observed_lies_in_the_space_that_is_announced(name, observation):
+    env = make(name, observation=observation)
+    seen = [env.reset(seed=0)[0], env.step(np.ones(3))[0]]
+    assert all(env.observation_space.contains(x) for x in seen)
+    assert env.action_space == gym.spaces.Box(-1, 1, (3,), np.float32)
+    env.close()
+
+
+def test_a_picture_is_given_to_who_asked_for_pictures_25_times_a_second(reach):
+    assert reach.render() is None
+    env = make("reach", render_mode="rgb_array")
+    env.reset(seed=0)
+    assert env.render().shape == (84, 84, 3)
+    assert env.metadata == {"render_modes": ["rgb_array"], "render_fps": FPS}
+    assert pytest.approx(FPS) == 1 / (DT * SUBSTEPS) == 25
+    env.close()
+
+
+def test_a_closed_environments_simulator_is_gone():
+    env = make("reach")
+    client = env.world.client
+    assert pybullet.isConnected(client)
+    env.close()
+    assert not pybullet.isConnected(client)
+
+
+def test_numbers_of_other_libraries_are_numbers(reach):
+    """NumPy's True, and a tensor; one that wants a gradient has to be asked for its numbers."""
+    for value in (True, np.True_):
+        reach.reset(seed=0, options={"scatter": value})
+    reach.step(torch.zeros(3))
+    with pytest.raises(InvalidAction, match="give three finite numbers"):
+        reach.step(torch.zeros(3, requires_grad=True))
 
 
 FALLING = {"push": "cube", "slide": "puck", "coffee": "mug"}

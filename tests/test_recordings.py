@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from zipfile import BadZipFile
 
 import numpy as np
 import pytest
@@ -21,6 +22,7 @@ from tasks.world import (
     record_expert,
     save_recordings,
 )
+from tasks.world import recording as recording_module
 
 # The films were made with OpenBLAS's kernels for processors with AVX2, named after Intel's Haswell.
 # Others round the arm's linear algebra otherwise, by 1e-20 m, and a contact may make more of it: in
@@ -178,6 +180,42 @@ def test_a_file_of_recordings_that_is_missing_or_cut_is_named(tmp_path):
         path.write_bytes(other)
         with pytest.raises(InputError, match="not a complete file"):
             load_recordings(path)
+
+
+@pytest.mark.parametrize("error", [BadZipFile, EOFError, KeyError, OSError, ValueError])
+def test_whatever_ails_a_file_of_recordings_it_is_named(error, tmp_path, monkeypatch):
+    """As zip, NumPy and the disk put it: cut, empty, of other arrays, unreadable, pickled."""
+
+    def fails(path):
+        raise error("it is broken")
+
+    path = tmp_path / "experts.npz"
+    path.write_bytes(b"x")
+    monkeypatch.setattr(np, "load", fails)
+    with pytest.raises(InputError, match=r"experts.npz: not a complete file"):
+        load_recordings(path)
+
+
+def test_a_recording_without_a_step_is_one_frame_and_comes_back_from_its_file(tmp_path):
+    env = tasks.bare("reach", observation="state")
+    frames, pixels, recording = film(env, 5, [])
+    assert frames.shape == (1, 9) and pixels.shape == (1, 4)
+    assert recording.actions.shape == (0, 3) and not recording.scatter
+    save_recordings(tmp_path / "kept.npz", [recording, film(env, 6, [np.zeros(3)])[2], recording])
+    kept = load_recordings(tmp_path / "kept.npz")
+    assert [(one.seed, len(one.states), len(one.actions)) for one in kept] == [
+        (5, 1, 0), (6, 2, 1), (5, 1, 0)
+    ]  # fmt: skip
+    env.close()
+
+
+def test_a_file_of_recordings_is_written_whole_or_not_at_all(tmp_path, monkeypatch):
+    written = []
+    monkeypatch.setattr(recording_module, "write_atomic", lambda path, data: written.append(path))
+    env = tasks.bare("reach", observation="state")
+    save_recordings(tmp_path / "kept.npz", [film(env, 5, [])[2]])
+    assert written == [tmp_path / "kept.npz"] and not list(tmp_path.iterdir())
+    env.close()
 
 
 def test_the_robots_experts_are_filmed_as_they_are_learnt_from(tmp_path, monkeypatch):

@@ -12,7 +12,7 @@ import tasks
 from lbw_minimal import imitate, video, wrappers
 from tasks import world
 from tasks.commands.recipe import fields_of
-from tasks.world import DT, SUBSTEPS, random_actions
+from tasks.world import DT, SUBSTEPS, Leg, expert_actions, random_actions
 from tasks.world import motion as module
 from tasks.world.env import LOW, TOUCH
 
@@ -178,9 +178,10 @@ def test_what_the_arms_weigh_is_what_their_models_say(make):
     assert info[2] == pytest.approx(3 * [0.4 * 0.15**2 / 12 + 0.01])
 
 
-def test_joints_have_no_motor_and_no_damping_of_bullets_own(make):
+@pytest.mark.parametrize("embodiment", ["robot", "human"])
+def test_joints_have_no_motor_and_no_damping_of_bullets_own(make, embodiment):
     """Let go, the arm falls as its energy says: what it loses in height it gains in speed."""
-    env = make("reach", "human")
+    env = make("reach", embodiment)
     env.reset(seed=0)
     p, arm = env.world.p, env.arm
     q, _ = arm.state()
@@ -251,6 +252,40 @@ def test_a_take_that_begins_beside_the_object_seeks_it_for_its_first_half(make, 
     sought = (ways >= 0).all(0)
     assert sought[:9].all() == (height == 0.02)
     assert not sought[10:].all()
+
+
+@pytest.mark.parametrize(("gap", "height", "seeks"), [
+    (0.049, LOW - 0.001, True), (-0.049, LOW - 0.001, True),
+    (0.051, LOW - 0.001, False), (0.03, LOW + 0.001, False),
+])  # fmt: skip
+def test_beside_is_five_centimetres_from_a_touch_and_as_low_as_things_are(
+    gap, height, seeks, monkeypatch
+):
+    """gap: m from where tip and object would touch, to the object's left or right."""
+    low, contact = 0.02, 0.04
+    x = np.sign(gap) * (contact + abs(gap))
+    env = SimpleNamespace(
+        CONTACT=contact, WORKSPACE=((0, 0, low), (1, 0, 1)), object_position=lambda: np.zeros(3),
+        arm=SimpleNamespace(goal=np.array([x, 0, low + height])),
+    )  # fmt: skip
+    monkeypatch.setattr(module, "random_actions", lambda rng, towards=0.0: iter(100 * [towards]))
+    ways = list(islice(module._wander(env, None, 10), 10))
+    assert ways == (4 * [-np.sign(gap)] + 6 * [0] if seeks else 10 * [0])
+
+
+def test_a_leg_shorter_than_a_step_takes_one_and_an_exact_one_is_never_bent_or_slowed():
+    env = SimpleNamespace(STEP=1.0, arm=SimpleNamespace(goal=np.zeros(3)))
+    ends = np.array([[0.5, 0, 0], [0.5, 0, 0.4]])
+    env.waypoints = lambda: [Leg(ends[0], 0.01, exact=True), Leg(ends[1], 0.4, exact=True)]
+    for seed in range(5):
+        goals = []
+        for action in expert_actions(env, np.random.default_rng(seed)):
+            env.arm.goal = env.arm.goal + action
+            goals.append(env.arm.goal)
+        assert len(goals) == 1 + 10
+        np.testing.assert_allclose([goals[0], goals[-1]], ends, atol=1e-6)
+        assert np.abs(np.array(goals[1:])[:, 0] - 0.5).max() < 1e-6
+        env.arm.goal = np.zeros(3)
 
 
 def test_takes_of_random_motion_have_their_frames_and_each_a_place_of_its_own(monkeypatch):
