@@ -170,6 +170,59 @@ def test_between_a_weak_hit_and_a_strong_one_is_the_next(monkeypatch):
     assert asked[4:] == pytest.approx([np.sqrt(asked[2] * asked[3])]) and factor == asked[4]
 
 
+def test_a_hit_that_misses_is_done_as_fast_as_can_be(monkeypatch):
+    """The object has not moved, so there is no proportion to tell how much faster."""
+    asked = rehearsing(monkeypatch, lambda f: ended(1.0 if f > 3 else 0.5, start=0.5))
+    assert module._timed_hit(None, None, [], []) == 4 and asked == [1, 4]
+
+
+def test_of_all_hits_the_one_that_came_nearest_is_done(monkeypatch):
+    """However often: here a weak one and a strong one lead to the same two places for ever."""
+    asked = rehearsing(monkeypatch, lambda f: ended(0.97 if f < 1.2 else 1.2))
+    assert module._timed_hit(None, None, [], []) < 1.2 and len(asked) == 12
+
+
+@pytest.mark.parametrize(
+    ("reached", "odd"), [(1.45, False), (1.55, True), (0.69, False), (0.65, True)]
+)
+def test_a_hit_of_half_as_much_again_is_worth_a_warning(monkeypatch, reached, odd):
+    rehearsing(monkeypatch, lambda f: ended((f / reached) ** 2))
+    notes, warnings = [], []
+    module._timed_hit(None, None, notes, warnings)
+    assert (len(notes), len(warnings)) == ((0, 1) if odd else (1, 0))
+
+
+def test_a_slow_run_up_belongs_to_the_hit():
+    """A fifth of the top speed is no rest: at twice the speed it takes half as long, too."""
+    motion = along(0, 0, 0.2, 0.4, 1.4, 2.4, 2.4, contact=4, arrival=5)
+    assert module._faster(motion, 2.0).tip[:, 0].tolist() == pytest.approx([0, 0, 0.4, 2.4, 2.4])
+
+
+def test_an_object_that_arrives_at_once_is_led_a_step_later():
+    env, goals = Table(SCENE), []
+    for action in commands(env, along(0, 1, 1, 1, contact=1, arrival=1), further=0.4):
+        env.arm.goal = env.arm.goal + env.STEP * action
+        goals.append(env.arm.goal[0])
+    assert goals == pytest.approx([1, 1.4, 1.4])
+
+
+def test_a_rehearsal_looks_at_no_picture_and_the_performance_does(monkeypatch):
+    env, seen = Table(SCENE), []
+    env.observation = "rgb"
+
+    def film(env, seed, actions):
+        seen.append((env.observation, seed, len(list(actions))))
+        if len(seen) == 2:
+            raise KeyboardInterrupt
+        return None, None, "recording"
+
+    monkeypatch.setattr(module, "film", film)
+    assert module._rehearse(env, along(0, 1, 2)) == "recording" and env.observation == "rgb"
+    with pytest.raises(KeyboardInterrupt):
+        module._rehearse(env, along(0, 1, 2))
+    assert env.observation == "rgb" and seen == 2 * [("state", 0, 2)]
+
+
 def test_a_push_that_fails_is_done_again_at_two_thirds_of_the_pace(monkeypatch):
     motion, results = along(0, 1, 2, 2), iter([(0.0, False), (0.02, True)])
     monkeypatch.setattr(module, "_measured_push", lambda env, motion: next(results))
