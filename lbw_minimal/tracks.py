@@ -35,7 +35,7 @@ SHARE = 0.3  # of a film, in which the background is seen; at 0.5 the arm covers
 ARM = 8  # grey levels between arm and background; a gripper hardly stands out from a wall
 NEAR = 3.0  # pixels over which the arm's nearest pixels count; with 1.5 its speed is half noise
 HAND = 4.2  # pixels, about the width of a hand, robot's or human's
-FLOW: dict[str, Any] = {"winSize": (WINDOW, WINDOW), "maxLevel": 2, "criteria": (3, 30, 0.01)}
+FLOW: dict[str, Any] = {"winSize": (WINDOW, WINDOW), "maxLevel": 2}  # a half and a quarter
 
 
 def corners(frame: np.ndarray, where: np.ndarray | None = None) -> np.ndarray:
