@@ -16,6 +16,7 @@ import tasks
 from lbw_minimal import follow, sac, tracks, video
 from lbw_minimal.follow import TrackReward, TrackWrapper
 from lbw_minimal.imitate import Run
+from lbw_minimal.reward import LAMBDA
 from lbw_minimal.training import InputError
 from tasks.__main__ import main
 from tasks.push import RECIPE
@@ -38,6 +39,46 @@ def test_the_reward_of_three_steps_by_hand():
     assert found[1][0] == pytest.approx(-1 / 8 - 3 / 8 - 2 / 8)
     # 8 - 3 = 5 where the demonstration moves by 4: r2 = -1/8; no way is left, so no approach
     assert found[2][1] == pytest.approx({"r1": 0, "r2": -1 / 8, "r3": 0})
+
+
+def test_unless_asked_the_weights_are_one_three_and_one():
+    """The first two are those of the keypoints' reward."""
+    d, d_next, g = np.array([0.5, 0]), np.array([1.0, 1]), np.array([2.0, 3])
+    r, parts = TrackReward(PATH)(d, d_next, g, 1)
+    assert min(abs(part) for part in parts.values()) > 0.1
+    assert r == pytest.approx(parts["r1"] + 3 * parts["r2"] + parts["r3"])
+    assert follow.LAMBDA[:2] == LAMBDA
+
+
+def test_the_longest_displacement_is_the_measure_and_not_the_last():
+    """A thing that goes 8 pixels on and comes 3 back, with the arm 4 away at its farthest."""
+    reward = TrackReward([[0, 0], [4, 0], [8, 0], [5, 0]])
+    assert reward.L == 8 and reward.last == 3
+    _, parts = reward(np.array([4.0, 0]), np.array([8.0, 0]), np.array([0, 4.0]), 1)
+    assert parts == {"r1": 0, "r2": 0, "r3": 0}
+    _, parts = reward(np.array([8.0, 0]), np.array([5.0, 0]), np.array([0, 4.0]), 2)
+    assert parts["r3"] == pytest.approx(-(1 - 5 / 8) * 4 / 8)
+    # a way counts along where the demonstration ends, in its whole length
+    assert reward.stretch(np.array([2.0, 0])) == pytest.approx(8 / 6)
+
+
+def test_the_demonstrations_clock_goes_evenly_and_its_motion_in_its_own_time():
+    """A hit is faster than the approach to it, and stays so."""
+    path = np.array([[0, 0]] * 9 + [[20, 0]] * 2, float)
+    reward = TrackReward(path, horizon=50)
+    np.testing.assert_array_equal(reward.d_E, path)
+    assert [reward.clock(t) for t in (0, 5, 10, 11)] == [0, 0.5, 1, 1]
+    assert reward.episode == round(11 / 0.8)
+
+
+@pytest.mark.parametrize(("way", "moves"), [(2.9, False), (3.1, True)])
+def test_a_demonstration_moves_its_object_by_three_pixels(way, moves):
+    path = np.linspace((0, 0), (way, 0), 9)
+    if moves:
+        TrackReward(path)
+    else:
+        with pytest.raises(InputError, match=r"by 2\.9 pixels; it takes 3"):
+            TrackReward(path)
 
 
 def test_after_its_end_the_demonstration_rests_at_its_goal():
@@ -156,6 +197,95 @@ def test_an_object_that_starts_ahead_is_seen_to_go_as_much_of_its_shorter_way():
     seen, _ = play(TrackWrapper(Film(frames), tracker, TrackReward(shown.path)))
     np.testing.assert_allclose(42 * seen[:, 0], 16.5 / 13.5 * d[:19, 0], atol=0.3)
     assert 42 * seen[-1, 0] > d[18, 0] + 1
+
+
+class Scripted:
+    """A tracker that says what it is told to: displacement and way to the arm, frame by frame."""
+
+    ahead = np.array([2.0, 0])
+
+    def __init__(self, d, g):
+        self.said, self.t = list(zip(np.array(d, float), np.array(g, float), strict=True)), 0
+
+    def reset(self, frame):
+        self.t = 0
+        self.d, self.g = self.said[0]
+
+    def step(self, frame):
+        self.t += 1
+        self.d, self.g = self.said[self.t]
+
+
+def test_what_an_agent_sees_and_earns_is_the_reward_of_the_step_by_hand():
+    """s = 8 / 6. The reward is asked for s d_t, s d_{t+1}, g_{t+1} and t, from 0 every time."""
+    d = [[0, 0], [0, 1], [3, 1], [6, 0], [6, 0]]
+    g = [[5, 5], [4, 4], [3, 3], [2, 2], [1, 1]]
+    frames, reward, asked = np.zeros((5, 84, 84, 3), np.uint8), TrackReward(PATH), []
+    pay = type(reward).__call__
+
+    class Noted(TrackReward):
+        def __call__(self, *of):
+            asked.append([np.asarray(x).tolist() for x in of])
+            return pay(self, *of)
+
+    env = TrackWrapper(Film(frames), Scripted(d, g), Noted(PATH))
+    s = 8 / 6
+    x = np.concatenate([s * np.array(d), np.array(g)], axis=1)
+    target = PATH[[1, 2, 3, 3, 3]]
+    for _ in range(2):
+        asked.clear()
+        seen = [env.reset(seed=0)[0]]
+        for t in range(4):
+            obs, r, _, _, info = env.step(np.zeros(3, np.float32))
+            seen.append(obs)
+            assert (r, dict.__getitem__(info, "reward_parts")) == reward(
+                s * np.array(d[t]), *x[t + 1].reshape(2, 2), t
+            )
+        for t, obs in enumerate(seen):
+            now, one, two = x[t], x[max(t - 1, 0)], x[max(t - 2, 0)]
+            wanted = np.concatenate([now, now - one, one - two, target[t] - now[:2]]) / 42
+            np.testing.assert_allclose(obs, [*wanted, min(t, 3) / 3], atol=1e-6)
+        assert [of[3] for of in asked] == [0, 1, 2, 3]
+
+
+def test_what_an_agent_sees_is_never_beyond_eight_half_pictures():
+    frames = np.zeros((3, 84, 84, 3), np.uint8)
+    tracker = Scripted([[0, 0], [900, -900], [0, 0]], [[0, 0]] * 3)
+    env = TrackWrapper(Film(frames), tracker, TrackReward(PATH))
+    env.reset(seed=0)
+    obs, *_ = env.step(np.zeros(3, np.float32))
+    assert obs[:2].tolist() == [8, -8] and env.observation_space.contains(obs)
+
+
+def test_an_episode_ends_a_quarter_after_the_demonstration_and_never_after_the_tasks_own_end(
+    monkeypatch,
+):
+    """What a film of the robot shows behind it is the wall that the tracker is given."""
+    demo, robot = ways()[0], np.full((5, 84, 84, 3), 77, np.uint8)
+    for horizon, longest, episode in ((300, 20, 25), (20, 16, 20)):
+        stage = gym.make(tasks.id_of("push"), max_episode_steps=horizon, observation="rgb")
+        env, reward = follow.watched(stage, demo, robot)
+        assert len(reward.d_E) == longest and reward.episode == episode
+        assert (env.get_wrapper_attr("tracker").wall == 77).all()
+        monkeypatch.setattr(tracks.Tracker, "_look", lambda tracker, frame: None)
+        env.reset(seed=0)
+        ends = [env.step(np.zeros(3, np.float32))[2:4] for _ in range(episode)]
+        assert ends == [(False, False)] * (episode - 1) + [(False, True)]
+        env.close()
+
+
+def test_the_options_of_a_reset_reach_the_task():
+    asked = []
+
+    class Asked(Film):
+        def reset(self, *, seed=None, options=None):
+            asked.append((seed, options))
+            return super().reset(seed=seed)
+
+    frames = np.zeros((3, 84, 84, 3), np.uint8)
+    env = TrackWrapper(Asked(frames), Scripted([[0, 0]], [[0, 0]]), TrackReward(PATH))
+    env.reset(seed=3, options={"scatter": True})
+    assert asked == [(3, {"scatter": True})]
 
 
 def test_an_episode_that_the_task_ends_is_cut_and_never_terminal():

@@ -61,6 +61,25 @@ def test_a_corner_is_a_hundredth_as_strong_as_the_best(contrast, is_one):
     assert (found > 45).all(1).any() == is_one and (found < 45).all(1).any()
 
 
+@pytest.mark.parametrize(("contrast", "is_one"), [(12, False), (14, True)])
+def test_a_corner_in_one_colour_alone_counts_as_much_as_one_in_three(contrast, is_one):
+    frame = np.full((84, 84, 3), 60, np.uint8)
+    frame[20:40, 20:40], frame[50:70, 50:70, 0] = 190, 60 + contrast
+    assert (tracks.corners(frame) > 45).all(1).any() == is_one
+
+
+@pytest.mark.parametrize("colour", [0, 1, 2])
+def test_what_has_left_or_looks_otherwise_does_so_in_any_one_colour(colour):
+    """Blue on grey has left where blue alone changed; what comes back less blue is another."""
+    first, last = WALL.copy(), WALL.copy()
+    first[40:50, 30:40, colour] += 90
+    last[40:50, 50:60, colour] += 90
+    points = np.array([[32.0, 45]])
+    assert tracks.silhouette(first, last, np.array([20.0, 0]), points).sum() == 100
+    last[40:50, 57:60, colour - 1] += 40
+    assert tracks.silhouette(first, last, np.array([20.0, 0]), points).sum() == 70
+
+
 @pytest.mark.parametrize(("apart", "one"), [(1.4, True), (1.6, False)])
 def test_points_of_one_object_differ_by_less_than_a_pixel_and_a_half(apart, one):
     d = np.zeros((5, 3, 2))
