@@ -1,10 +1,13 @@
 """The arms and their controller: claims about kinematics and about how the tip moves."""
 
+import itertools
 import xml.etree.ElementTree as ET
 
+import cv2
 import numpy as np
 import pytest
 
+import tasks
 from tasks.reach import Reach
 from tasks.world.bodies import human, panda
 
@@ -91,6 +94,78 @@ def test_reset_puts_the_tip_where_it_was_told(env):
     for goal in ((0.45, 0, 0.05), (0.70, 0.01, 0.15)):
         env.arm.reset(np.array(goal))
         np.testing.assert_allclose(env.arm.tip_pose()[0], goal, atol=1e-5)
+
+
+def test_a_reset_far_away_is_exact_and_turns_no_elbow_upside_down(env):
+    """Of a row of arms with the tip in one place the one that is near the rest posture."""
+    arm = env.arm
+    for goal in itertools.product((0.3, 0.45, 0.6), (-0.3, 0, 0.3), (0.02, 0.2, 0.4)):
+        arm.reset(np.array(goal))
+        (q, dq), free = arm.state(), np.linalg.svd(arm.jacobian(arm.state()[0]))[2][-1]
+        assert np.abs(arm._error(np.array(goal))).max() < 1e-6 and not dq.any()
+        assert np.abs(q - arm.home).max() < 2.5, goal
+        assert abs(free @ (q - arm.home)) < 0.35, goal
+
+
+def test_the_way_to_a_goal_is_turned_back_in_radians(env):
+    """The tip is turned by 0.02 about each axis in turn, and lacks as much the other way."""
+    arm = env.arm
+    x, R = arm.tip_pose()
+    for axis in np.eye(3):
+        turn = rotation(0.02 * axis)
+        arm.tip_pose = lambda turn=turn: (x + 0.01, turn @ R)
+        np.testing.assert_allclose(arm._error(x), [*3 * [-0.01], *(-0.02 * axis)], atol=1e-5)
+
+
+def rotation(vector):
+    """Matrix (3, 3) of a rotation vector in rad."""
+    return cv2.Rodrigues(np.array(vector))[0]
+
+
+def test_a_goal_that_asks_for_too_much_comes_nearer_until_the_fastest_joint_is_at_its_limit(env):
+    """Half of a speed that would be twice a joint's limit, in the same direction."""
+    arm = env.arm
+    x, home = arm.tip_pose()[0], arm.state()[0]
+    pulls = []
+    for way in (0.005, 0.3, 0.6):
+        arm.goal = x + (way, 0, 0)
+        arm.prepare()
+        pulls.append(arm._bias - arm._Kq @ home - arm._h)
+    arm.speed = np.full(7, np.inf)
+    arm.goal = x + (0.3, 0, 0)
+    arm.prepare()
+    free = arm._bias - arm._Kq @ home - arm._h
+    np.testing.assert_allclose(pulls[1], pulls[2], atol=1e-6)  # both are cut to the same
+    share = np.linalg.norm(pulls[1]) / np.linalg.norm(free)
+    J, M = arm.jacobian(home), arm.mass_matrix(home)
+    dq = 10 * np.linalg.solve(M, J.T) @ np.linalg.inv(J @ np.linalg.solve(M, J.T))[:, 0] * 0.3
+    assert share == pytest.approx((arm.spec.speed / np.abs(dq)).min(), rel=0.01)  # KP / KD is 10
+
+
+def test_a_stiffer_arm_is_as_much_stiffer_in_its_posture():
+    """A fortieth of the tip's; or slide's elbow would swing up when actions alternate."""
+    for name in ("push", "slide"):
+        env = tasks.bare(name, observation="state")
+        assert env.arm.kp_posture == pytest.approx(env.KP / 40) and env.arm.kp == env.KP
+        env.close()
+
+
+def test_what_gravity_takes_beyond_a_joints_torque_is_all_that_is_sent(env):
+    """Nothing is left to drive with; the drive never turns round."""
+    arm, sent = env.arm, []
+    arm.goal = arm.tip_pose()[0] + (0.05, 0, 0.05)
+    arm.prepare()
+    q, dq = arm.state()
+    asked = arm._bias - arm._Kq @ q - arm._Kd @ dq
+    i = np.abs(arm._h).argmax()
+    arm._bias = arm._bias + np.sign(arm._h[i]) * np.abs(asked).max() * np.eye(7)[i]
+    arm.effort = np.full(7, 1e6)
+    arm.effort[i] = 0.9 * np.abs(arm._h[i])
+    send = arm.p.setJointMotorControlArray
+    arm.p.setJointMotorControlArray = lambda *args, **more: sent.append(more["forces"])
+    arm.actuate()
+    arm.p.setJointMotorControlArray = send
+    np.testing.assert_allclose(sent[0], arm._h)
 
 
 def test_no_torque_is_above_the_joints_limit_and_all_are_cut_by_one_factor(env):

@@ -132,6 +132,82 @@ def test_contact_is_how_deep_the_hand_is_in_a_thing(make):
     assert depths[1] == pytest.approx(max(-point[8] for point in points), abs=1e-4)
 
 
+@pytest.mark.parametrize("arm", ["robot", "human"])
+def test_hand_and_fingers_alone_feel_a_thing(make, arm):
+    """A cube is put into every part of the arm, its base too."""
+    env = make("push", arm)
+    env.reset(seed=0)
+    p, body = env.world.p, env.arm.body
+    feeling = {env.arm.links[name] for name in env.arm.spec.reach_links}
+    touched = set()
+    for link in range(-1, p.getNumJoints(body)):
+        at = p.getBasePositionAndOrientation(body) if link < 0 else p.getLinkState(body, link)
+        p.resetBasePositionAndOrientation(env.cube, at[0], (0, 0, 0, 1))
+        p.performCollisionDetection()
+        touched |= {point[3] for point in p.getContactPoints(body, env.cube)}
+    assert touched == feeling
+
+
+@pytest.mark.parametrize(("depth", "moved"), [(0.0009, False), (0.0011, True)])
+def test_a_scattered_tip_that_is_in_a_thing_goes_to_the_left_end_of_its_box(
+    depth, moved, make, monkeypatch
+):
+    """A centimetre inside of it, at the height where it was."""
+    env = make("push")
+    monkeypatch.setattr(env, "_stand_beside", lambda: None)
+    env.reset(seed=3, options={"scatter": True})
+    drawn = env.arm.goal.copy()
+    monkeypatch.setattr(env, "contact", lambda: depth)
+    env.reset(seed=3, options={"scatter": True})
+    wanted = (0.42 + 0.01, 0, drawn[2]) if moved else drawn
+    assert env.arm.goal == pytest.approx(wanted) and drawn[0] > 0.45
+
+
+@pytest.mark.parametrize(
+    ("depths", "goes"),
+    [((0,), (1,)), ((0.0011, 0.0009), (1, -1)), ((0.002, 0.002), (1, -1, 0)), ((), (1, -1, 0))],
+)
+def test_a_tip_stands_on_the_other_side_where_it_would_be_in_a_thing_or_where_it_was(
+    make, monkeypatch, depths, goes
+):
+    """Sides of the object in the order in which they are tried, 0 for where the tip was."""
+    env, tried = make("push"), []
+    env.reset(seed=0)
+    p, before = env.world.p, np.array([0.45, 0, 0.15])
+    p.resetBasePositionAndOrientation(env.cube, (0.58, 0, 0.025), (0, 0, 0, 1))
+    env.arm.reset(before)
+    told = iter(depths)
+    monkeypatch.setattr(env, "contact", lambda: next(told, 0.002))
+    monkeypatch.setattr(
+        env.arm, "reset", lambda tip: tried.append(0 if tip is before else np.sign(tip[0] - 0.58))
+    )
+    env.arm.goal = before
+    env._stand_beside()
+    first = tried[0]
+    assert [side * first for side in tried] == list(goes)
+
+
+@pytest.mark.parametrize(("cube", "sides"), [(0.43, {1}), (0.73, {-1}), (0.58, {1, -1})])
+def test_where_there_is_no_room_on_one_side_the_tip_stands_on_the_other(make, cube, sides):
+    env, tips = make("push"), []
+    env.reset(seed=0)
+    for _ in range(30):
+        env.world.p.resetBasePositionAndOrientation(env.cube, (cube, 0, 0.025), (0, 0, 0, 1))
+        env.arm.reset(np.array([0.58, 0, 0.15]))
+        env._stand_beside()
+        tips.append(env.arm.goal)
+    assert {np.sign(x - cube) for x, _, z in tips if z < 0.1} == sides
+
+
+@pytest.mark.parametrize(("height", "in_the_way"), [(0.069, True), (0.071, False)])
+def test_a_tip_two_centimetres_above_a_thing_is_in_no_ones_way(make, height, in_the_way):
+    env = make("push")
+    env.reset(seed=0)
+    env.arm.goal = np.array([0.60, 0, height])
+    env.put(env.cube, np.array([0.0, 0, 0.025]), 0.025, 0.05, (0.599, 0.602))
+    assert (env.object_position()[0] == 0.602) == in_the_way
+
+
 @pytest.mark.parametrize("name", ["reach", "push", "slide"])
 def test_marks_of_the_target_are_seen_and_not_felt(make, name):
     env = make(name)
