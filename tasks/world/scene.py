@@ -224,7 +224,7 @@ class World:
     def _undamp(self, body):
         # Bullet's default damping of 0.04 would brake a sliding object on top of friction.
         for link in range(-1, self.p.getNumJoints(body)):
-            self.p.changeDynamics(body, link, linearDamping=0, angularDamping=0, jointDamping=0)
+            self.p.changeDynamics(body, link, linearDamping=0, angularDamping=0)
 
     def take_apart(self) -> None:
         """Put everything that moves freely where it touches nothing."""
