@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import tasks
-from tasks.world import FINGER, GREEN, RED
+from tasks.world import FINGER, GREEN, RED, expert_actions
 
 
 @pytest.fixture(scope="module")
@@ -177,3 +177,27 @@ def test_a_goal_ahead_by_more_than_a_step_would_be_hidden_from_the_policy():
     steps = {"reach": 0.03, "push": 0.03, "coffee": 0.012, "drawer": 0.01}
     for name, step in steps.items():  # with 3 cm chance pushes a mug or shuts a drawer
         assert step == getattr(tasks.module(name), name.capitalize()).STEP
+
+
+@pytest.mark.parametrize(
+    ("name", "half_way", "tip", "thing", "within"),
+    [
+        ("reach", (0.5542, 0.0866), (0.6782, 0.0599), 0.6782, 0.0003),
+        ("push", (0.4759, 0.0202), (0.6294, 0.0184), 0.6648, 0.0003),
+        ("slide", (0.6228, 0.0200), (0.6270, 0.0200), 0.9270, 0.0050),
+        ("coffee", (0.4545, 0.0300), (0.6485, 0.0296), 0.6820, 0.0003),
+        ("drawer", (0.4819, 0.0634), (0.6301, 0.0619), 0.6430, 0.0003),
+    ],
+)
+def test_the_robots_expert_ends_where_it_did_when_the_shipped_policies_learnt(
+    make, name, half_way, tip, thing, within
+):
+    """In m along x and z; its world and its arm are those of the results. A puck goes as far as
+    the last bit of a hit says, see `test_recordings.py`; so do the human's, there."""
+    env = make(name)
+    states = [env.true_state()]
+    states += [env.step(action)[0] for action in expert_actions(env)]
+    middle, end = states[len(states) // 2], states[-1]
+    assert middle[[0, 2]] == pytest.approx(half_way, abs=0.0003)
+    assert end[[0, 2]] == pytest.approx(tip, abs=0.0003)
+    assert end[3] == pytest.approx(thing, abs=within)
