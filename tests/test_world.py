@@ -1,11 +1,13 @@
 """Bodies of a world, made for a task that is yet to be written: where parts stand, what is felt."""
 
+import ctypes
 import os
+import sys
 
 import numpy as np
 import pytest
 
-from tasks.world import GREEN, RED, Part, TaskEnv, World
+from tasks.world import GREEN, RED, Part, TaskEnv, World, scene
 
 
 @pytest.fixture
@@ -111,13 +113,15 @@ def test_what_was_taken_apart_touches_nothing(world):
     assert world.position(still) == pytest.approx((0.6, 0, 0.02))
 
 
-def test_a_world_leaves_no_file_open_and_standard_output_as_it_was(capfd):
-    def free():
-        """The lowest number that the next file would get."""
-        number = os.open(os.devnull, os.O_RDONLY)
+def free():
+    """The numbers that the next eight files would get."""
+    numbers = [os.open(os.devnull, os.O_RDONLY) for _ in range(8)]
+    for number in numbers:
         os.close(number)
-        return number
+    return numbers
 
+
+def test_a_world_leaves_no_file_open_and_standard_output_as_it_was(capfd):
     print("before", end="")
     before = free()
     for _ in range(3):
@@ -125,3 +129,29 @@ def test_a_world_leaves_no_file_open_and_standard_output_as_it_was(capfd):
     assert free() == before
     print(" after")
     assert capfd.readouterr() == ("before after\n", "")
+
+
+def test_what_is_said_while_a_world_begins_is_not_heard_and_what_was_said_before_is(capfd):
+    print("before", end="")
+    with scene._silence():
+        sys.stdout.flush()
+        os.write(1, b"out")
+        os.write(2, b"error")
+    assert capfd.readouterr() == ("before", "")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="asks Linux's C library by name")
+def test_what_c_holds_back_while_a_world_begins_is_not_heard_later(capfd):
+    C = ctypes.CDLL(None)
+    with scene._silence():
+        C.printf(b"from C")
+    C.fflush(None)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_the_table_is_60_centimetres_deep_and_its_top_is_at_height_0(world):
+    """What is pushed aside by 30 cm falls, and an arm's goal is never below the top."""
+    low, high = np.array(world.p.getAABB(world.table))
+    np.testing.assert_allclose([low[1], high[1], high[2]], [-0.3, 0.3, 0], atol=0.002)
+    np.testing.assert_allclose([low[0], high[0]], [0, 1.6], atol=0.002)
+    assert world.p.getDynamicsInfo(world.table, -1)[1] == 1.0  # an object's friction is its own
