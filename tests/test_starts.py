@@ -330,6 +330,20 @@ def test_a_take_that_begins_beside_the_object_seeks_it_for_its_first_half(make, 
     assert not sought[10:].all()
 
 
+def test_random_motion_is_filmed_in_takes_of_a_second_and_the_bar_counts_them(monkeypatch):
+    asked, bar = [], []
+
+    def takes(env, frames, seed, take):
+        asked.append((frames, seed, take))
+        yield from 2 * [(np.zeros((2, 1)), np.ones((2, 4)), None)]
+
+    monkeypatch.setattr(module, "random_takes", takes)
+    monkeypatch.setattr(module, "counted", lambda takes, total, name: bar.append(total) or takes)
+    film, truth = module.record_random(None, 60, seed=3)
+    assert asked == [(60, 3, 25)] and bar == [3]
+    assert film.shape == (4, 1) and truth.shape == (4, 4)
+
+
 @pytest.mark.parametrize(("gap", "height", "seeks"), [
     (0.049, LOW - 0.001, True), (-0.049, LOW - 0.001, True),
     (0.051, LOW - 0.001, False), (0.03, LOW + 0.001, False),

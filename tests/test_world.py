@@ -132,21 +132,39 @@ def test_a_world_leaves_no_file_open_and_standard_output_as_it_was(capfd):
 
 
 def test_what_is_said_while_a_world_begins_is_not_heard_and_what_was_said_before_is(capfd):
-    print("before", end="")
-    with scene._silence():
-        sys.stdout.flush()
-        os.write(1, b"out")
-        os.write(2, b"error")
+    with open(1, "w", closefd=False) as out, pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "stdout", out)  # which holds back, as it does into a file
+        print("before", end="")
+        with scene._silence():
+            out.flush()
+            os.write(1, b"out")
+            os.write(2, b"error")
     assert capfd.readouterr() == ("before", "")
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="asks Linux's C library by name")
 def test_what_c_holds_back_while_a_world_begins_is_not_heard_later(capfd):
     C = ctypes.CDLL(None)
+    out, whole, none = ctypes.c_void_p.in_dll(C, "stdout"), 0, 2  # _IOFBF and _IONBF
+    C.setvbuf(out, None, whole, 4096)
     with scene._silence():
         C.printf(b"from C")
     C.fflush(None)
+    C.setvbuf(out, None, none, 0)
     assert capfd.readouterr() == ("", "")
+
+
+def test_what_was_painted_is_hidden_from_the_camera_until_it_is_asked_for(world):
+    """It is rendered once; the colours are kept."""
+    p = world.p
+    block = world.box((0.05, 0.05, 0.05), (0.6, 0, 0.05), (0.2, 0.4, 0.6, 1))
+    world.paint()
+    assert world.scenery == [world.table, block]
+    for shown in (False, True, False):
+        world.show_scenery(shown)
+        for body in world.scenery:
+            assert p.getVisualShapeData(body)[0][7][3] == shown
+        assert p.getVisualShapeData(block)[0][7][:3] == pytest.approx((0.2, 0.4, 0.6))
 
 
 def test_the_table_is_60_centimetres_deep_and_its_top_is_at_height_0(world):
