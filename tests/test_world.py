@@ -146,7 +146,8 @@ def test_what_is_said_while_a_world_begins_is_not_heard_and_what_was_said_before
 def test_what_c_holds_back_while_a_world_begins_is_not_heard_later(capfd):
     C = ctypes.CDLL(None)
     out, whole, none = ctypes.c_void_p.in_dll(C, "stdout"), 0, 2  # _IOFBF and _IONBF
-    C.setvbuf(out, None, whole, 4096)
+    room = ctypes.create_string_buffer(4096)
+    C.setvbuf(out, room, whole, len(room))
     with scene._silence():
         C.printf(b"from C")
     C.fflush(None)

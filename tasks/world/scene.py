@@ -222,9 +222,9 @@ class World:
         return visual, p.createCollisionShape(kind, **touch) if part.solid else -1
 
     def _undamp(self, body):
-        # Bullet's default damping of 0.04 would brake a sliding object on top of friction.
-        for link in range(-1, self.p.getNumJoints(body)):
-            self.p.changeDynamics(body, link, linearDamping=0, angularDamping=0)
+        # Bullet's default damping of 0.04 would brake a sliding object on top of friction. It is the
+        # whole body's, with all links.
+        self.p.changeDynamics(body, -1, linearDamping=0, angularDamping=0)
 
     def take_apart(self) -> None:
         """Put everything that moves freely where it touches nothing."""
