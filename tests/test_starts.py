@@ -335,13 +335,13 @@ def test_random_motion_is_filmed_in_takes_of_a_second_and_the_bar_counts_them(mo
 
     def takes(env, frames, seed, take):
         asked.append((frames, seed, take))
-        yield from 2 * [(np.zeros((2, 1)), np.ones((2, 4)), None)]
+        yield from ((np.full((2, 1), i), i + np.arange(8.0).reshape(2, 4), None) for i in (0, 8))
 
     monkeypatch.setattr(module, "random_takes", takes)
     monkeypatch.setattr(module, "counted", lambda takes, total, name: bar.append(total) or takes)
     film, truth = module.record_random(None, 60, seed=3)
     assert asked == [(60, 3, 25)] and bar == [3]
-    assert film.shape == (4, 1) and truth.shape == (4, 4)
+    assert film[:, 0].tolist() == [0, 0, 8, 8] and truth.ravel().tolist() == [*range(16)]
 
 
 @pytest.mark.parametrize(("gap", "height", "seeks"), [

@@ -104,7 +104,7 @@ def test_the_outlet_hangs_above_the_mug_and_the_hands_way_before_it_is_free(make
 def test_a_drawer_that_is_pulled_or_pushed_ends_where_its_rail_does(make):
     env = make("drawer")
     p = env.world.p
-    for q, speed, end in ((-0.145, -0.6, -0.15), (-0.005, 0.6, 0.0)):
+    for q, speed, end in ((-0.149, -1.0, -0.15), (-0.001, 1.0, 0.0)):
         p.resetJointState(env.drawer, 0, q, targetVelocity=speed)
         for _ in range(10):
             env.step(np.zeros(3))
