@@ -64,6 +64,23 @@ def test_a_thing_starts_in_the_middle_and_as_far_from_its_goal_as_its_task_says(
     assert env.object_position()[0] - env.CONTACT - tip[0] > -0.02 and tip[2] > 0.1
 
 
+@pytest.mark.parametrize(
+    ("name", "thing"), [("push", "cube"), ("slide", "puck"), ("coffee", "mug")]
+)
+def test_a_thing_is_put_by_its_own_half_width_and_height(make, monkeypatch, name, thing):
+    """By these a scattered one keeps clear of the arm; at the fixed start no span is asked."""
+    env, put = make(name), []
+    monkeypatch.setattr(env, "put", lambda *of: put.append(of))
+    x = env.object_position()
+    for scatter in (True, False):
+        env.place(np.array([0.01, 0.002, 0]), scatter)
+    wide, _, high = size(env.world.p, getattr(env, thing))
+    for (body, at, half, height, span), scatter in zip(put, (True, False), strict=True):
+        assert body == getattr(env, thing) and at == pytest.approx(x + (0.01, 0.002, 0), abs=1e-4)
+        assert (half, height) == pytest.approx((wide / 2, high))
+        assert (span is not None) == scatter
+
+
 def test_a_mug_is_felt_as_a_cylinder_and_its_handle_stands_out_by_two_centimetres(make):
     """The handle is on the far side from the hand, and weighs next to nothing."""
     env = make("coffee")
