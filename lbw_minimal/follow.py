@@ -155,7 +155,7 @@ def watched(env: gym.Env, demo: np.ndarray, robot: np.ndarray) -> tuple[gym.Env,
     horizon = env.spec.max_episode_steps if env.spec else None
     reward = TrackReward(shown.path, horizon=horizon)
     env = TrackWrapper(env, tracker, reward)
-    return TimeLimit(env, min(horizon or reward.episode, reward.episode)), reward
+    return TimeLimit(env, reward.episode), reward
 
 
 def follow(

@@ -57,7 +57,8 @@ def test_a_drawing_has_96_pixels_an_inch_and_the_one_that_is_turned_half_as_many
     (turned,) = re.findall('base64,([^"]+)', sliders.image.value)
     assert size(base64.b64decode(turned)) == (1.5 * 2 * 96, 1.5 * 96)
     wide, high = size(Sliders(noted([]), {"a": range(10)})._repr_mimebundle_()[0]["image/png"])
-    assert wide == pytest.approx(4 * high, abs=4)  # each is a square
+    assert wide == pytest.approx(4 * high, abs=4)  # each is a square of 3.1 inches
+    assert high == pytest.approx(3.1 * 96, abs=1)
 
 
 def test_curves_have_a_grid_to_read_them_by_and_a_drawing_has_none():
