@@ -8,6 +8,7 @@ import socket
 import time
 import xml.etree.ElementTree as ET
 from pathlib import Path
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -19,7 +20,7 @@ import umsgpack
 import tasks
 from tasks import TASKS, bare
 from tasks.world.meshes import normals, read_mesh, read_obj
-from tasks.world.viewer import FOV, Recorder, drawing, mirror, transform
+from tasks.world.viewer import FOV, Recorder, drawing, mirror, pack, transform
 from tests import browser
 
 PANDA = Path(pybullet_data.getDataPath()) / "franka_panda" / "panda.urdf"
@@ -414,6 +415,21 @@ def test_one_stands_as_far_off_and_as_far_aside_as_the_tasks_camera(mirrored):
         eye = 0.5 + aside, -1.2 * wider, 0.45 * wider
         assert scene.eye == pytest.approx(eye)
         assert scene.target == pytest.approx((0.42 + aside, 0, 0.22))
+
+
+def test_a_mirrored_scenery_is_hidden_again_from_the_tasks_camera(mirrored):
+    for env, scene in mirrored.values():
+        p = env.world.p
+        assert all(p.getVisualShapeData(body)[0][7][3] == 0 for body in env.world.scenery)
+        still = {scene.links[row] for row, *_, rgba in scene.shapes if rgba[3] == 1}
+        assert {(body, -1) for body in env.world.scenery} <= still  # and seen in the page
+
+
+def test_a_page_writes_its_numbers_in_four_bytes():
+    """To 0.1 micrometre; in eight a page of 300 frames would be half as large again."""
+    told = pack(SimpleNamespace(lower=lambda: {"x": 0.3}))
+    assert len(told) == len(umsgpack.packb({"x": 0.0}, force_float_precision="single"))
+    assert umsgpack.unpackb(told)["x"] == pytest.approx(0.3, abs=1e-7)
 
 
 def test_the_page_looks_from_where_the_picture_does_with_its_y_axis_up(mirrored):

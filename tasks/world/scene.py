@@ -222,8 +222,8 @@ class World:
         return visual, p.createCollisionShape(kind, **touch) if part.solid else -1
 
     def _undamp(self, body):
-        # Bullet's default damping of 0.04, of a body with all its links, would brake a sliding object
-        # on top of friction.
+        # Bullet's default damping of 0.04, of a body and all its links, would brake a sliding
+        # object on top of friction.
         self.p.changeDynamics(body, -1, linearDamping=0, angularDamping=0)
 
     def take_apart(self) -> None:
