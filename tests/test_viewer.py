@@ -325,6 +325,8 @@ def test_what_turns_on_the_spot_is_animated_at_25_frames_a_second_unless_asked(c
     assert part["path"].endswith(f"/{body}/0") and part["clip"]["fps"] == 25
     recorder.save(tmp_path / "a.html", "a title", fps=10)
     assert (tmp_path / "a.html").read_text() == recorder.html("a title", fps=10)
+    recorder.save(tmp_path / "b.html")
+    assert "<title>PyBullet scene</title>" in (tmp_path / "b.html").read_text()
 
 
 def test_only_the_bodies_asked_for_are_recorded(client):
@@ -447,6 +449,8 @@ def test_a_picture_of_a_tasks_scene_shows_its_table_and_leaves_it_as_it_was(mirr
     before = env.world.render()
     picture = cv2.imdecode(np.frombuffer(scene.picture(), np.uint8), cv2.IMREAD_COLOR)
     np.testing.assert_array_equal(env.world.render(), before)
+    hidden = [env.world.p.getVisualShapeData(body)[0][7][3] for body in env.world.scenery]
+    assert not any(hidden)
     red, blue = picture[240:, 200:440, 2].astype(int), picture[240:, 200:440, 0].astype(int)
     assert (red - blue > 25).mean() > 0.5
     paint = [material for *_, material in played(scene.html("x"), 0)]
