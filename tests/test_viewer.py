@@ -315,14 +315,15 @@ def test_the_animation_repeats_for_ever_at_the_frame_rate_asked_for(client):
 
 
 def test_what_turns_on_the_spot_is_animated_at_25_frames_a_second_unless_asked(client, tmp_path):
-    body = primitives(client)
+    look = p.createVisualShape(p.GEOM_BOX, halfExtents=[0.1] * 3, physicsClientId=client)
+    body = p.createMultiBody(1, -1, look, physicsClientId=client)
     recorder = Recorder(client)
-    for _ in range(2):
+    for turn in ((0, 0, 0, 1), (0, 0, 0.6, 0.8)):
+        p.resetBasePositionAndOrientation(body, (0, 0, 0), turn, client)
         recorder.snap()
-        p.resetJointState(body, 0, 0.5, physicsClientId=client)
     told = commands(recorder.html("x"))
     ((part,),) = (c["animations"] for c in told if c["type"] == "set_animation")
-    assert part["path"].endswith(f"/{body}/0") and part["clip"]["fps"] == 25
+    assert part["path"].endswith(f"/{body}/-1") and part["clip"]["fps"] == 25
     recorder.save(tmp_path / "a.html", "a title", fps=10)
     assert (tmp_path / "a.html").read_text() == recorder.html("a title", fps=10)
     recorder.save(tmp_path / "b.html")

@@ -142,7 +142,7 @@ def test_what_is_said_while_a_world_begins_is_not_heard_and_what_was_said_before
     assert capfd.readouterr() == ("before", "")
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="asks Linux's C library by name")
+@pytest.mark.skipif(sys.platform != "linux", reason="needs Linux, whose C library is asked by name")
 def test_what_c_holds_back_while_a_world_begins_is_not_heard_later(capfd):
     C = ctypes.CDLL(None)
     out, whole, none = ctypes.c_void_p.in_dll(C, "stdout"), 0, 2  # _IOFBF and _IONBF
