@@ -174,8 +174,13 @@ def test_the_classifier_reward_hands_all_it_was_given_on(tmp_path, monkeypatch):
         assert (k["seed"], k["device"]) == (5, "there")
 
 
-def test_a_rivals_policy_is_replayed_on_its_own_task_alone(tmp_path):
+def test_a_rivals_policy_is_replayed_on_its_own_task_alone(tmp_path, monkeypatch):
     classifier.save(tmp_path / "classifier.safetensors", classifier.GoalClassifier(20), "push")
+    monkeypatch.setattr(sac_ae, "load", lambda path: path.name)
+    policy, env = rivals.replayed(gym.make(tasks.id_of("push")), tmp_path, "push")
+    assert policy == "policy.safetensors" and env.observation_space.shape == (3, 84, 84, 3)
+    assert env.get_wrapper_attr("classifier_reward").clip == classifier.CLIP
+    env.close()
     with pytest.raises(InputError, match="push"):
         rivals.replayed(reach(), tmp_path, "reach")
 
