@@ -442,6 +442,21 @@ def test_in_reach_alone_nothing_is_moved():
     assert [name for name in tasks.TASKS if not tasks.moves_object(name)] == ["reach"]
 
 
+def test_the_classifier_reward_is_shown_as_many_robot_videos_as_in_the_paper(monkeypatch):
+    """Thirty-five; whoever wants fewer of them closes the world behind them."""
+    asked, closed = [], []
+    env = SimpleNamespace(close=lambda: closed.append(True))
+    monkeypatch.setattr(tasks, "bare", lambda name, **options: asked.append(options) or env)
+    monkeypatch.setattr(
+        world, "expert_takes", lambda env, wanted: ((i, None, -i) for i in range(wanted))
+    )
+    assert list(tasks.robot_experts("push", 0.01)) == [(i, -i) for i in range(35)]
+    some = tasks.robot_experts("push", 0.01)
+    assert next(some) == (0, 0) and len(closed) == 1
+    some.close()
+    assert len(closed) == 2 and asked == 2 * [{"jitter": 0.01}]
+
+
 def test_the_film_of_the_robots_pace_has_its_own_seed_and_400_frames(monkeypatch):
     asked = []
 
