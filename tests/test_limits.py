@@ -101,6 +101,8 @@ def test_joints_that_are_spun_turn_on_at_their_limit_after_one_simulation_step(a
     assert speeds[0, 3] == pytest.approx(2 * limit[3])
     assert (np.abs(speeds[1:]) <= limit + 1e-12).all()
     assert speeds[1, [3, 5]] == pytest.approx([limit[3], -limit[5]])
+    turned = np.diff(angles[:4], axis=0)[:, [3, 5]] * (1, -1)
+    assert (turned > 0).all() and turned[0] == pytest.approx(2 * limit[[3, 5]] / 250, rel=0.2)
     # They are slowed down where they are: the way of a step is at most twice the limit's.
     assert (np.abs(np.diff(angles, axis=0)) <= 2 * limit / 250 + 1e-9).all()
     env.close()
