@@ -9,7 +9,7 @@ import pytest
 
 import tasks
 from tasks.reach import Reach
-from tasks.world.bodies import human, panda
+from tasks.world.bodies import human, limb, panda
 
 EMBODIMENTS = ("robot", "human")
 
@@ -29,12 +29,37 @@ def test_the_humans_wrist_is_weaker_than_its_elbow_and_that_than_its_shoulder():
     assert human().speed == panda().speed
 
 
+def test_hand_and_fingers_may_touch_the_world():
+    assert panda().reach_links == ("panda_hand", "panda_leftfinger", "panda_rightfinger")
+    assert human().reach_links == ("hand",)
+
+
+def test_a_limb_is_round_and_its_normals_lean_to_its_thin_end():
+    """A cone of half a right angle: its normals lean as much; sixteen corners to a ring."""
+    rows = [row.split() for row in limb((0.0, 1.0), (1.0, 0.0)).splitlines()]
+    points, normals = (
+        np.array([row[1:] for row in rows if row[0] == kind], float) for kind in ("v", "vn")
+    )
+    assert len(points) == len(normals) == 2 * 16
+    np.testing.assert_allclose(np.hypot(*points[:16, 1:].T), 1, atol=1e-4)
+    np.testing.assert_allclose(normals[:, 0], np.sqrt(0.5), atol=1e-3)
+    np.testing.assert_allclose(normals[:16, 1:], points[:16, 1:] * np.sqrt(0.5), atol=1e-3)
+
+
 @pytest.fixture(params=EMBODIMENTS)
 def env(request):
     env = Reach(embodiment=request.param, observation="state")
     env.reset(seed=0)
     yield env
     env.close()
+
+
+def test_at_rest_the_tip_points_straight_down(env):
+    """The pitches of shoulder, elbow and wrist add up to it, to a hundredth of a radian."""
+    env.arm._set(env.arm.home)
+    x, _ = env.arm.tip_pose()
+    assert np.abs(env.arm._error(x)[3:]).max() < 0.01
+    assert 0.4 < x[0] < 0.7 and abs(x[1]) < 0.001 and x[2] > 0
 
 
 def test_jacobian_agrees_with_finite_differences(env):
