@@ -91,3 +91,96 @@ def test_the_extent_is_the_way_of_the_corner_opposite_to_one_that_stays(fixed, a
     way = (turn - np.eye(2)) @ ((W, H) - 2 * fixed)
     sways = np.stack([np.eye(3)[:2], view])
     assert camera.extent(sways, H, W) == pytest.approx(np.abs(way).max() / W)
+
+
+@pytest.mark.parametrize("x", [2.5, 9.3, 15.0])
+def test_a_shift_is_found_to_a_tenth_of_a_pixel_be_it_small_or_a_sixteenth_of_the_width(x):
+    sways = camera.sway(through(shifted([0, x])))
+    np.testing.assert_allclose(sways[-1], [[1, 0, x], [0, 1, 0]], atol=0.1)
+
+
+def test_each_frame_of_a_clip_is_looked_at_if_they_are_few():
+    """A hundred frames, to and fro: what lies between two of them is not interpolated."""
+    x = 3.0 * (np.arange(100) % 2)
+    small = np.stack([cv2.resize(f, (120, 90)) for f in through(shifted(x))])
+    np.testing.assert_allclose(camera.sway(small)[:, 0, 2], x / 2, atol=0.3)
+
+
+def test_along_stripes_nothing_tells_and_so_nothing_moves():
+    """Upright stripes tell how far they go across, and neither a zoom nor what is up and down."""
+    x = np.arange(W + 60)
+    wave = (120 + 40 * np.sin(x / 9) + 30 * np.sin(x / 23)).astype(np.uint8)
+    frames = np.stack([np.broadcast_to(wave[s : s + W, None], (H, W, 3)) for s in range(0, 20, 2)])
+    np.testing.assert_allclose(camera.sway(frames)[-1], [[1, 0, 18], [0, 1, 0]], atol=0.3)
+
+
+def test_what_a_steadied_camera_sees_no_more_stays_as_it_was_last_seen():
+    """It goes by two pixels a frame; each frame is of one level of grey."""
+    frames = np.stack([np.full((6, 10, 3), 50 * t, np.uint8) for t in (1, 2, 3)])
+    sways = np.stack([[[1, 0, 2.0 * t], [0, 1, 0]] for t in range(3)])
+    steady = camera.steadied(frames, sways)[:, 3, :, 0]
+    assert steady.tolist() == [10 * [50], 2 * [50] + 8 * [100], 2 * [50] + 2 * [100] + 6 * [150]]
+
+
+@pytest.mark.parametrize(
+    ("moving", "standing", "stands"),
+    [(60, 0, False), (60, 49, False), (60, 50, True), (0, 0, True), (0, 60, True)],
+)
+def test_a_camera_moves_if_more_than_six_cells_say_so_to_five_that_it_stands(
+    moving, standing, stands
+):
+    """Of two frames of 9 x 12 cells, in the first and in the second."""
+    votes = np.zeros((2, 108))
+    votes[0, :moving], votes[1, 108 - standing :] = 1, -1
+    assert camera._stands(votes.reshape(2, 9, 12)) == stands
+
+
+@pytest.mark.parametrize(("rows", "stands"), [(3, True), (4, False)])
+def test_cells_that_say_the_camera_moves_lie_about_a_fifth_of_the_picture(rows, stands):
+    """Their middles span (rows - 1) x 9 cells of 108: a sixth, or a quarter."""
+    votes = np.zeros((1, 9, 12))
+    votes[0, :rows, :10] = 1
+    assert camera._stands(votes) == stands
+
+
+def test_a_pixel_that_is_off_by_the_noise_is_half_unlike_and_one_not_shown_is_neither():
+    off, inside = np.array([[0.0, 2.0, -6.0, 50.0]]), np.array([[True, True, True, False]])
+    np.testing.assert_allclose(camera._unlike(off, inside, 2.0), [[0, 0.5, 0.9, 0.5]])
+
+
+def test_the_noise_is_what_most_pixels_are_off_and_at_least_two_levels():
+    """1.4826 medians of the size are a normal deviation; a few pixels that moved change nothing."""
+    off = np.random.default_rng(0).normal(0, 5, (100, 100))
+    off[:20] = 200
+    everywhere = np.ones(off.shape, bool)
+    assert camera._noise(off[20:], everywhere[20:]) == pytest.approx(5, rel=0.05)
+    assert camera._noise(off, everywhere) < 7
+    off[:20] = 0
+    shown = everywhere.copy()
+    shown[:20] = False
+    assert camera._noise(off, shown) == pytest.approx(5, rel=0.05)
+    assert camera._noise(off / 50, everywhere) == camera._noise(off, ~everywhere) == 2
+
+
+def test_a_cell_of_a_twelfth_votes_where_a_tenth_speaks_for_one_side():
+    """Half of the picture as the moved camera sees it, half as the one that stands does."""
+    moved, still = through(shifted([8, 0]))
+    picture = camera._Picture(still, 200)
+    both = np.where(np.arange(W)[None, :, None] < W // 2, moved, still)
+    there = np.array([[1, 0, -8], [0, 1, 0], [0, 0, 1.0]])
+    votes = picture.votes(camera._plain(both, picture.size), there)
+    assert votes.shape == (9, 12)
+    assert (votes[:, 1:5] >= 0).mean() > 0.9 and (votes[:, 1:5] > 0).mean() > 0.2
+    assert (votes[:, 7:] == 0).mean() < 0.8 and (votes[:, 7:] <= 0).all()
+
+
+@pytest.mark.parametrize(("unlike", "vote"), [(0.08, 0), (0.12, 1)])
+def test_a_tenth_more_unlike_is_a_vote(unlike, vote, monkeypatch):
+    """The noise is two levels, so a pixel that is off by 2 q^1/2 is unlike by q / (1 + q)."""
+    picture = camera._Picture(np.zeros((H, W, 3), np.uint8), 200)
+    off = np.full((150, 200), 2 * np.sqrt(unlike / (1 - unlike)))
+    offs = [(0 * off, off >= 0), (off, off >= 0)]
+    for given, said in ((offs, vote), (offs[::-1], -vote)):
+        given = iter(given)
+        monkeypatch.setattr(camera._Picture, "_off", lambda *_, g=given: next(g))
+        assert (picture.votes(picture.plain, np.eye(3)) == said).all()

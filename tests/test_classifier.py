@@ -1,5 +1,7 @@
 """Claims about the goal classifier: what it learns from, how, and what its reward pays."""
 
+from inspect import signature
+
 import numpy as np
 import pytest
 import torch
@@ -7,7 +9,7 @@ import torch
 import tasks
 from lbw_minimal import classifier, transporter, video
 from lbw_minimal.classifier import ClassifierReward, GoalClassifier, goal_frames
-from lbw_minimal.training import Checkpoint, InputError
+from lbw_minimal.training import Checkpoint, InputError, load_state
 
 ITERATIONS = 200  # of the one training that several claims share
 
@@ -143,6 +145,40 @@ def test_reward_is_the_logit_of_the_frame_clipped_to_one():
         assert ClassifierReward(model, clip=3.0)(grey(0)[0]) == (paid, {"logit": logit})
 
 
+def test_logits_up_to_ten_are_paid_in_full():
+    """Along push's robot videos they stay within 4.4, which the clip must not flatten."""
+    model = GoalClassifier()
+    with torch.no_grad():
+        for p in model.parameters():
+            p.zero_()
+        model.layers[-1].bias.fill_(7.0)
+    assert ClassifierReward(model)(grey(0)[0])[0] == pytest.approx(0.7)
+
+
+def test_each_step_goes_down_its_own_gradient():
+    """A second step on the same mixture has the same gradient, not the sum of both."""
+    model, labels = GoalClassifier(), torch.ones(128)
+    still = torch.optim.SGD(model.parameters(), 0.0)
+    images, seen = torch.rand(128, 3, 48, 48), []
+    for _ in range(2):
+        classifier._update(model, still, images, labels, np.random.default_rng(0))
+        seen.append(model.layers[-1].weight.grad.clone())
+    assert torch.allclose(*seen)
+
+
+def test_the_last_step_is_logged_and_kept_whatever_its_number(tmp_path, monkeypatch):
+    """A run that is killed before it has written the classifier does not train again."""
+    monkeypatch.setattr(classifier, "_update", lambda *_: 0.5)
+    path = tmp_path / "classifier"
+    few = dict(iterations=7, seed=0, checkpoint=Checkpoint(path))
+    assert [row["step"] for row in classifier.train(grey(200), grey(20), **few)[1]] == [7]
+    assert load_state(path)["state"]["step"] == 7
+
+
+def test_a_classifier_learns_for_as_long_as_vices_naive_form():
+    assert signature(classifier.train).parameters["iterations"].default == 10_000
+
+
 def test_same_seed_same_model_and_another_seed_another():
     a, b, c = (
         classifier.logits(
@@ -190,9 +226,11 @@ def test_videos_without_goal_or_rest_are_refused_in_one_sentence(videos, why):
         goal_frames(videos)
 
 
-def test_training_without_goal_images_is_refused():
+def test_training_without_goal_images_or_others_is_refused():
     with pytest.raises(InputError, match="positive has 0 frames"):
         classifier.train(grey(0, 0), grey(0), iterations=1, seed=0)
+    with pytest.raises(InputError, match="negative has 0 frames"):
+        classifier.train(grey(0), grey(0, 0), iterations=1, seed=0)
 
 
 def test_saved_model_comes_back_and_no_other_does(tmp_path):

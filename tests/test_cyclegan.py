@@ -188,6 +188,31 @@ def test_generators_start_as_published():
     assert all((p == 0).all() for name, p in parts if name.endswith("bias"))
 
 
+def test_a_generator_has_six_blocks_of_eighty_channels_and_norms_and_rectifies(monkeypatch):
+    """What its last layer sees is of mean 0 and deviation 1 in each channel, cut off at 0: of a
+    normal one the mean is (2 pi)^-1/2, and half is 0. A training takes as many by default."""
+    torch.manual_seed(0)
+    model, seen = CycleGAN(), []
+    wide = [m for m in model.G.modules() if isinstance(m, nn.Conv2d) and m.in_channels == 80]
+    assert len(wide) == 2 * 6 and all(m.out_channels == 80 for m in wide)
+    model.G.out.register_forward_pre_hook(lambda _, inputs: seen.append(inputs[0]))
+    model.y_of_x(torch.rand(1, 3, 84, 84) * 2 - 1)
+    assert seen[0].min() == 0
+    assert seen[0].mean().item() == pytest.approx((2 * np.pi) ** -0.5, abs=0.05)
+    assert (seen[0] == 0).float().mean().item() == pytest.approx(0.5, abs=0.1)
+    monkeypatch.setattr(cyclegan, "_update", lambda *_: {})
+    trained, _ = cyclegan.train(*squares(), iterations=1, seed=0)
+    assert trained.sizes == model.sizes
+
+
+def test_a_finished_training_is_in_its_checkpoint(tmp_path, monkeypatch):
+    """Or one that is killed before its weights are written would begin at an earlier step."""
+    monkeypatch.setattr(cyclegan, "_update", lambda *_: {})
+    path = tmp_path / "cyclegan"
+    cyclegan.train(*squares(), iterations=3, seed=0, width=2, checkpoint=Checkpoint(path))
+    assert load_state(path)["state"]["step"] == 3
+
+
 def test_translation_is_G_and_does_not_depend_on_the_frames_beside_it():
     torch.manual_seed(0)
     model, frames = (

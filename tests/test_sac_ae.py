@@ -15,6 +15,7 @@ from lbw_minimal.imitate import Run
 from lbw_minimal.replay import FrameBuffer
 from lbw_minimal.sac_ae import SACAE, SIZES, train
 from lbw_minimal.sac_ae_networks import Decoder, Encoder, Patches
+from lbw_minimal.sac_networks import draw
 from lbw_minimal.training import Checkpoint, InputError, save_state
 
 SHAPE = (84, 84, 3)
@@ -78,6 +79,7 @@ def test_the_slim_size_is_that_of_the_papers_table(monkeypatch):
     monkeypatch.setattr(sac_ae, "learn", lambda *_, **more: asked.update(more) or [])
     train(dot(), steps=7, seed=0)
     assert (asked["updates"], asked["batch"], asked["random_steps"]) == (1, 64, 500)
+    assert (asked["hold"], asked["evaluate_every"]) == (1, 10)
 
 
 def test_a_patch_is_a_position_and_its_pixels_are_channels():
@@ -145,11 +147,12 @@ def test_the_autoencoder_learns_from_reconstruction_and_penalty(monkeypatch):
     agent, batch = small(), batch_of()
     x = agent.normalise(batch["obs"])
     h = agent.encoder(x)
-    loss = ((agent.decoder(h) - agent.normalise.shrunk(x, 2)) ** 2).mean()
-    loss = loss + 0.1 * (0.5 * (h**2).sum(1)).mean()
+    error = ((agent.decoder(h) - agent.normalise.shrunk(x, 2)) ** 2).mean()
+    loss = error + 0.1 * (0.5 * (h**2).sum(1)).mean()
     learnt = [*agent.encoder.parameters(), *agent.decoder.parameters()]
     gradients, agent.updates = torch.autograd.grad(loss, learnt), 1
-    agent.update(batch)
+    told = agent.update(batch)
+    assert told["reconstruction"] == pytest.approx(error.item())
     for p, gradient in zip(learnt, gradients, strict=True):
         assert torch.allclose(p.grad, gradient, atol=1e-6)
 
@@ -226,8 +229,9 @@ def test_the_penalties_are_the_publications_and_decay_is_the_decoders_alone():
 
 def test_all_learning_rates_fall_together():
     agent = small(critic_lr=2e-3, actor_lr=1e-3)
-    agent.anneal(0.65)
     groups = agent.optimizer.param_groups + agent.autoencoder.param_groups
+    assert [g["lr"] for g in groups] == [2e-3, 1e-3, 2e-3, 2e-3]
+    agent.anneal(0.65)
     assert [g["lr"] for g in groups] == pytest.approx([1e-3, 5e-4, 1e-3, 1e-3])
 
 
@@ -264,6 +268,37 @@ def test_the_actor_learns_every_second_update():
         agent.update(batch_of(seed=seed))
         moved.append(not all(equal(before, agent.actor.net)))
     assert moved == [False, True, False, True]
+
+
+def test_the_log_is_told_the_target_of_q_and_the_policys_entropy():
+    agent, batch = small(), batch_of()
+    torch.manual_seed(1)
+    y, h = agent.critic_target(batch), agent.encoder(agent.normalise(batch["obs"]))
+    _, log_pi = draw(*agent.actor.head(h))
+    agent.updates = 1
+    torch.manual_seed(1)
+    told = agent.update(batch)
+    assert told["q"] == pytest.approx(y.mean().item(), rel=1e-4)
+    assert told["entropy"] == pytest.approx(-log_pi.mean().item(), rel=1e-4)
+
+
+def test_the_encoders_layers_rectify_and_its_latents_are_normed():
+    """Of a fresh LayerNorm 50 numbers of mean 0 and deviation 1 come, before the tanh."""
+    agent = small()
+    x = agent.normalise(batch_of()["obs"])
+    features = agent.encoder.convs(x)
+    assert features.min() == 0 < features.max()
+    normed = agent.encoder(x).atanh()
+    assert torch.allclose(normed.mean(1), torch.zeros(4), atol=1e-4)
+    assert torch.allclose(normed.std(1, correction=0), torch.ones(4), atol=1e-2)
+
+
+def test_the_decoder_rectifies_before_each_convolution():
+    decoder, seen = small().decoder, []
+    for conv in decoder.convs:
+        conv.register_forward_pre_hook(lambda _, inputs: seen.append(inputs[0]))
+    decoder(torch.randn(2, 50))
+    assert len(seen) == 2 and all(x.min() == 0 for x in seen)
 
 
 def test_the_reconstruction_learns_toy_frames():
@@ -440,6 +475,36 @@ def test_the_first_random_actions_are_held_within_an_episode():
     for actions in Note.episodes[:3]:  # then come the trials of the last actor
         for t, action in enumerate(actions):
             assert (action == actions[max(t - 1, 0)]) == (t % 3 != 0 or t == 0)
+
+
+def test_frames_have_room_for_the_shortest_episodes_and_for_one_under_way(monkeypatch):
+    """An episode of one step has two frames; one of ten goes on when a single step was asked."""
+    asked = []
+    monkeypatch.setattr(sac_ae, "learn", lambda *_, **__: [])
+    monkeypatch.setattr(sac_ae, "FrameBuffer", lambda *args: asked.append(args[2]))
+    train(dot(), steps=50_000, seed=0)
+    assert asked[0] >= 2 * 50_000
+    monkeypatch.undo()
+    assert len(train(dot(), steps=1, seed=0)[1]) == 1
+
+
+def test_the_policy_is_tried_as_often_as_asked_and_the_log_is_told():
+    tried = []
+
+    def evaluate(agent):
+        tried.append(agent)
+        return {"tried": 0.25}
+
+    agent, log = train(dot(), steps=40, seed=0, evaluate=evaluate, evaluate_every=2)
+    assert tried == [agent, agent] and [row.get("tried") for row in log] == [None, 0.25] * 2
+
+
+def test_seeds_of_torch_and_of_the_episodes_are_those_asked_for(monkeypatch):
+    seeds, drawn = [], []
+    monkeypatch.setattr(sac_ae, "learn", lambda *_, **more: seeds.append(more["seed"]) or [])
+    for seed in (3, 4):
+        drawn.append(train(dot(), steps=5, seed=seed)[0].encoder.out[0].bias)
+    assert seeds == [3, 4] and not torch.equal(*drawn)
 
 
 def test_a_checkpoint_holds_no_frames(tmp_path):
