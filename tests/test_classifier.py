@@ -166,6 +166,31 @@ def test_each_step_goes_down_its_own_gradient():
     assert torch.allclose(*seen)
 
 
+def test_layers_but_the_last_are_rectified():
+    model, seen = GoalClassifier(), []
+    for layer in model.layers:
+        if isinstance(layer, torch.nn.Conv2d | torch.nn.Linear):
+            layer.register_forward_pre_hook(lambda _, inputs: seen.append(inputs[0].min().item()))
+    model(torch.rand(4, 3, 48, 48) * 2 - 1)
+    assert len(seen) == 4 and seen[0] < 0 and seen[1:] == [0, 0, 0]
+
+
+def test_an_image_is_taken_for_a_goal_from_a_logit_of_0_on(monkeypatch):
+    class Faint(torch.nn.Linear):
+        """A logit of 0.3 for white images, and of -0.3 for black ones."""
+
+        def __init__(self):
+            super().__init__(1, 1)
+
+        def forward(self, images):
+            return 0.3 * images.mean((1, 2, 3))
+
+    monkeypatch.setattr(classifier, "_update", lambda *_: 0.5)
+    monkeypatch.setattr(classifier, "GoalClassifier", Faint)
+    _, log = classifier.train(grey(255), grey(0), iterations=1, seed=0)
+    assert log[0]["accuracy"] == 1
+
+
 def test_the_last_step_is_logged_and_kept_whatever_its_number(tmp_path, monkeypatch):
     """A run that is killed before it has written the classifier does not train again."""
     monkeypatch.setattr(classifier, "_update", lambda *_: 0.5)

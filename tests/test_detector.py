@@ -188,6 +188,39 @@ def test_looking_both_ways_mirrors_the_maps_back():
     assert torch.allclose(place[0, 0], torch.tensor([12.0, 42.0]), atol=0.5)
 
 
+def test_looking_both_ways_is_a_mean_and_no_surer_than_either_look():
+    """For a network that sees the same in the mirror the two looks say the same."""
+    frames = np.zeros((1, 84, 84, 12), np.uint8)
+    frames[:, 40:44, 10:14] = 255
+    images = to_images(frames)
+    torch.testing.assert_close(both_ways(Bright(), images), Bright()(images)[0])
+
+
+def test_a_lone_frame_is_its_own_witness_and_counts_by_its_root():
+    p = torch.rand(1, 2, CELLS, CELLS)
+    torch.testing.assert_close(detector_networks.together(p), (p + 1e-6).sqrt())
+
+
+def test_the_frame_before_and_the_one_after_say_what_is_near():
+    """Two steps of a cell each way: 9 to 1 for a cell that stays against one that is two cells on
+    and two down, with one chance in twenty to be anywhere; three on, nothing else is left."""
+    p = torch.zeros(2, 2, CELLS, CELLS)
+    p[0, :, 20, 20] = 1
+    p[1] = 1 / CELLS**2
+    for order in (p, p.flip(0)):
+        seen = detector_networks.together(order)
+        seen = seen[1] if order is p else seen[0]
+        far, corner, same = seen[0, 5, 5], seen[0, 22, 22], seen[0, 20, 20]
+        assert ((same - far) / (corner - far)).item() == pytest.approx(9, rel=0.01)
+        assert (far / seen[0, 23, 20]).item() == pytest.approx(1, rel=0.01)
+        # A root of 1 here, and of a millionth in each of the other 1,763 cells.
+        here = 1 / (1 + 1763e-3)
+        rest = 1e-3 * here
+        near = 0.95 * (9 / 81 * here + 72 / 81 * rest) + 0.05 / CELLS**2
+        elsewhere = 0.95 * rest + 0.05 / CELLS**2
+        assert (same / far).item() == pytest.approx(near / elsewhere, rel=0.01)
+
+
 def test_two_equal_peaks_are_not_sure():
     one, two = (target(torch.full((1, 2, 2), at)) for at in (20.0, 60.0))
     assert (read(((one + two) / 2 + 1e-12).log())[1] - 0.5).abs().max() < 0.02
@@ -348,6 +381,19 @@ def test_the_second_look_takes_in_what_was_found_and_stays_within_the_picture():
     assert (left, top) == (160 - side // 2, 200 - side)
     few = sure * (np.arange(101) < 2)[:, None]
     assert detector._closer(place, few, (200, 300)) == (0, 0, 300)
+
+
+def test_the_second_look_takes_in_the_tip_as_well_and_stays_within_a_tall_picture():
+    """Objects at (150, 100), tips from (50, 60) to (150, 60): the middle is (100, 80)."""
+    n = 200
+    object_ = np.tile([150.0, 100.0], (n, 1))
+    tip = np.stack([np.linspace(50, 150, n), np.full(n, 60.0)], 1)
+    place, sure = np.stack([tip, object_], 1), np.ones((n, 2))
+    left, top, side = detector._closer(place, sure, (400, 300))
+    assert side == pytest.approx(1.5 * 96 + 120, abs=2)
+    assert (left, top) == (0, 0)
+    left, top, side = detector._closer(place + (140, 300), sure, (400, 300))
+    assert (left, top) == (300 - side, 400 - side)
 
 
 class TwoLooks(Detector):
@@ -528,6 +574,42 @@ def test_the_learning_rate_warms_up_holds_and_falls_over_the_last_three_quarters
     assert [row["step"] for row in log[:3]] == [50, 100, 150]
     # Each row is the mean of its own fifty steps, which all lose the same.
     assert {row["loss"] for row in log} == {log[0]["loss"]}
+
+
+def test_a_clip_is_drawn_by_the_trainings_seed_and_its_own_number():
+    clips = [detector._Drawings(seed)[i][0].frames for seed, i in ((1, 0), (2, 0), (1, 1), (1, 0))]
+    assert np.array_equal(clips[0], clips[3])
+    assert not any(np.array_equal(clips[0], clip) for clip in clips[1:3])
+
+
+def test_each_clip_is_seen_sixteen_times():
+    """When it was 32, the loss on clips of the pool was 0.6 lower than on any others. It stays for
+    256 iterations, so that a batch is of clips that have little in common."""
+    assert detector.BATCH / detector.NEW == 16 and detector.POOL / detector.NEW == 256
+
+
+def test_a_step_is_no_longer_than_a_gradient_of_1_however_bad_a_batch_is(monkeypatch):
+    norms, weight = [], torch.nn.Parameter(torch.ones(4))
+
+    class Tiny(torch.nn.Module):
+        def __init__(self):
+            super().__init__()
+            self.w = weight
+
+        def forward(self, images):
+            return self.w.sum(), None
+
+    monkeypatch.setattr(detector, "draw_clip", easy)
+    monkeypatch.setattr(detector, "POOL", 8)
+    nothing = torch.zeros(1, 12, 8, 8), None, None
+    monkeypatch.setattr(detector._Pool, "batch", lambda pool, rng, device: nothing)
+    monkeypatch.setattr(detector, "Network", Tiny)
+    monkeypatch.setattr(detector, "loss", lambda said, *_: 1000 * said)
+    monkeypatch.setattr(
+        torch.optim.AdamW, "step", lambda self, *_: norms.append(weight.grad.norm().item())
+    )
+    detector.train(iterations=2, seed=0)
+    assert norms == pytest.approx([1, 1], rel=1e-4)
 
 
 def test_a_detector_in_use_is_frozen():
