@@ -185,3 +185,108 @@ def test_arms_from_both_sides_in_a_twentieth_of_the_frames_are_two_people(
             footage.check(film)
     else:
         assert footage.check(film).warnings == []
+
+
+@pytest.mark.parametrize(
+    ("way", "verdict"),
+    [(0.0049, "stands"), (0.0051, "trembles"), (0.109, "trembles"), (0.111, "moves")],
+)
+def test_a_camera_trembles_from_a_two_hundredth_of_the_picture_on_and_moves_from_a_ninth_on(
+    room, way, verdict, monkeypatch
+):
+    monkeypatch.setattr(footage.camera, "extent", lambda *_: way)
+    film = arms(room, "left")
+    if verdict == "moves":
+        with pytest.raises(Unusable, match="the camera moves"):
+            footage.check(film)
+    else:
+        assert ("steadied" in "".join(footage.check(film).warnings)) == (verdict == "trembles")
+
+
+@pytest.mark.parametrize("longest", ["first", "last"])
+def test_it_is_the_longest_shots_camera_that_counts_and_all_shots_are_steadied(
+    room, longest, monkeypatch
+):
+    """What was steadied is searched for arms again: a camera that swings makes none."""
+    film, title = arms(room, "left"), np.repeat(room[None, : SIZE[0], : SIZE[1]], 12, axis=0)
+    shots = [film, title] if longest == "first" else [title, film]
+    asked, steadied = [], []
+
+    def sway(frames):
+        return np.full((len(frames), 2, 3), float(len(frames)))
+
+    monkeypatch.setattr(footage.camera, "sway", sway)
+    monkeypatch.setattr(
+        footage.camera, "extent", lambda sways, *size: asked.append((len(sways), *size)) or 0.05
+    )
+    monkeypatch.setattr(
+        footage.camera, "steadied", lambda f, s: steadied.append((len(f), s[0, 0, 0])) or 255 - f
+    )
+    found = footage.check(np.concatenate(shots), cuts=(len(shots[0]),))
+    assert asked == [(30, *SIZE)]
+    assert steadied == [(len(shot), len(shot)) for shot in shots]
+    np.testing.assert_array_equal(found.frames, 255 - np.concatenate(shots))
+
+
+def test_doors_are_those_of_the_steadied_frames(room, monkeypatch):
+    """The steadied ones show another arm, over the other edge."""
+    monkeypatch.setattr(footage.camera, "extent", lambda *_: 0.05)
+    monkeypatch.setattr(footage.camera, "steadied", lambda *_: arms(room, "right"))
+    assert footage.check(arms(room, "left")).enters == 1
+
+
+@pytest.mark.parametrize(
+    ("box", "frames", "arm"),
+    [
+        ((0, 20, 17, 17), 2, True),  # 289 pixels; 0.04 of the picture are 282
+        ((0, 20, 17, 16), 2, False),
+        ((0, 20, 17, 17), 1, False),  # noise moves a pixel once
+        ((4, 20, 17, 17), 2, True),  # a gap of four pixels to the edge is closed
+        ((5, 20, 17, 17), 2, False),
+        ((63, 20, 17, 17), 2, True),
+        ((62, 20, 17, 17), 2, False),
+        ((20, 4, 17, 17), 2, True),
+        ((20, 63, 17, 17), 2, True),
+    ],
+)
+def test_an_arm_is_a_twenty_fifth_of_the_picture_that_reaches_over_an_edge(box, frames, arm):
+    moves = np.stack([moving(box)] * frames + [moving()] * 5)
+    assert footage._comes_in(moves) == arm
+
+
+def test_the_largest_thing_is_asked_whether_it_comes_in():
+    lamp, toy = (0, 0, 17, 17), (40, 40, 20, 20)
+    assert not footage._comes_in(np.stack([moving(lamp, toy)] * 2))
+    assert not footage._comes_in(np.stack([moving()] * 2))
+
+
+def test_faint_motion_is_enough_for_an_arm_and_not_for_a_door(room, monkeypatch):
+    """Eleven grey levels at the shoulder: more than noise, and less than what moves for sure."""
+    asked = {}
+    still = np.zeros((20, 84, 84), np.float32)
+    still[:, 0, 0], still[:, 0, 1], still[:, 0, 2] = 9.5, 10.5, 16.5
+    background = np.zeros((84, 84), np.float32)
+    monkeypatch.setattr(footage, "before_background", lambda frames: (still, background, True))
+    monkeypatch.setattr(footage, "_comes_in", lambda m: asked.update(arm=m[0, 0, :3]) or True)
+    nowhere = np.full((20, 2), np.nan)
+    monkeypatch.setattr(footage, "_doors", lambda m: asked.update(door=m[0, 0, :3]) or nowhere)
+    found = footage.check(arms(room, "left"))
+    assert asked["arm"].tolist() == [False, True, True]
+    assert asked["door"].tolist() == [False, False, True]
+    assert np.isnan(found.enters)
+
+
+def test_the_ends_of_a_clip_are_a_sixteenth_each_and_what_stirs_a_little_stays():
+    """Of 64 frames four: a thing that stands in the first three of them is not seen there."""
+    for shown, stays in ((slice(0, 1), True), (slice(0, 3), False), (slice(4, 60), True)):
+        still = np.zeros((64, 84, 84))
+        still[shown, 30:40, 30:40] = 50
+        assert footage._unmoved(still) == stays
+    still = np.zeros((64, 84, 84))
+    still[:4, 30:35, 30:37] = 50  # 35 pixels, half a hundredth of the picture, are noise
+    assert footage._unmoved(still)
+    still[:4, 35, 30] = 50
+    assert not footage._unmoved(still)
+    still = np.zeros((64, 84, 84))
+    still[:4, 30:40, :40] = 50  # an arm
+    assert footage._unmoved(still)

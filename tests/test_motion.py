@@ -135,3 +135,29 @@ def test_a_jump_is_looked_for_without_what_a_sixth_of_the_picture_shares(monkeyp
     motion._unexplained(film([20, 22]), (112, 112))
     (across, down), _ = windows
     assert across == down and across % 2 and across / 112 == pytest.approx(1 / 6, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("rate", "at", "jumped"), [(25, 6, False), (25, 7, True), (5, 2, False), (5, 3, True)]
+)
+def test_what_is_usual_is_told_by_a_quarter_of_a_second_or_two_frames_on_each_side(
+    rate, at, jumped, monkeypatch
+):
+    """As much of a change so many frames before and after it makes one no jump."""
+    rest = np.zeros(40)
+    rest[[20 - at, 20, 20 + at]] = 20.0
+    monkeypatch.setattr(motion, "_unexplained", lambda frames, size: (rest, rest))
+    found = jumps(np.zeros((41, 84, 84, 3), np.uint8), np.arange(41) / rate)
+    assert (21 in found) == jumped
+
+
+@pytest.mark.parametrize(
+    ("level", "pause", "jumped"), [(0.29, 0, 0), (0.31, 0, 1), (0.09, 2, 0), (0.11, 2, 1)]
+)
+def test_a_change_of_a_tenth_of_a_level_is_noise(level, pause, jumped, monkeypatch):
+    """Where all else stands it takes three times as much, or a pause in which it came about."""
+    rest = np.zeros(40)
+    rest[20] = level
+    monkeypatch.setattr(motion, "_unexplained", lambda frames, size: (rest, rest))
+    times = np.arange(41) / 25 + pause * (np.arange(41) > 20)
+    assert jumps(np.zeros((41, 84, 84, 3), np.uint8), times) == [21] * jumped

@@ -187,3 +187,66 @@ def test_patches_at_the_pictures_edge_are_as_large_as_elsewhere(monkeypatch):
     places = [(0, np.array(at, float)) for at in ((0, 0), (119, 89), (200, -5), (60, 45))]
     patches.paths([frame, frame], places, None)
     assert cut == 4 * [(13, 13), (19, 19)]
+
+
+def test_of_five_things_that_are_gone_the_four_largest_are_looked_at():
+    gone = np.full((32, 100, 160, 3), 90, np.uint8)
+    for left, side in ((5, 8), (30, 10), (60, 12), (90, 14), (120, 16)):
+        gone[:16, 20 : 20 + side, left : left + side] = 200
+    middles = [at[0] for at in patches._changed(list(gone))]
+    np.testing.assert_allclose(middles, [127.5, 96.5, 65.5, 34.5])
+
+
+def test_what_is_gone_is_told_by_a_sixteenth_of_the_frames_at_each_end():
+    """Of 32 frames two: a hand that is there in one of them is not what the place looks like."""
+    stands = np.full((32, 100, 120, 3), 90, np.uint8)
+    stands[2:, 20:30, 30:40] = 200
+    assert len(patches._changed(list(stands))) == 1
+    stands[2:, 20:30, 30:40] = 90
+    stands[1, 20:30, 30:40] = 106  # half of it, in a median of two
+    assert patches._changed(list(stands)) == []
+
+
+@pytest.mark.parametrize(("deviation", "looked_at"), [(1.9, 0), (2.1, 2)])
+def test_a_patch_in_which_nothing_is_seen_is_not_looked_for(deviation, looked_at, monkeypatch):
+    monkeypatch.setattr(patches, "_path", lambda small, patch, tip: patch)
+    frame = np.full((80, 120, 3), 100.0)
+    frame[:, ::2] += deviation
+    frame[:, 1::2] -= deviation
+    assert len(patches.paths([frame], [(0, np.array([60.0, 40.0]))], None)) == looked_at
+
+
+def mended_by(monkeypatch, best, frames, found):
+    """What `mended` makes of a patch of that path, and what it was asked for."""
+    asked = []
+    monkeypatch.setattr(patches, "paths", lambda small, places, tip: asked.append(small) or [])
+    monkeypatch.setattr(patches, "chosen", lambda some: best)
+    return patches.mended(frames, found), asked[0]
+
+
+def test_patches_are_looked_for_in_48_frames_of_160_pixels_and_come_back_in_the_clips(monkeypatch):
+    """A clip of 95 frames of 320 x 240: every second one, at half of the size. A patch that is
+    just alike is just sure, and one that is wholly alike wholly."""
+    way = np.stack([np.linspace(20, 67, 48), np.full(48, 50.0)], 1)
+    alike = np.repeat([1.0, 0.6, 0.2], 16)
+    best = Path(way, alike, None, 120)
+    nowhere = Found(*np.zeros((2, 95, 2)), *np.zeros((2, 95)))
+    frames = np.zeros((95, 240, 320, 3), np.uint8)
+    mend, small = mended_by(monkeypatch, best, frames, nowhere)
+    assert len(small) == 48 and small[0].shape == (120, 160, 3)
+    np.testing.assert_allclose(mend.object[:, 0], 40 + np.arange(95))
+    np.testing.assert_allclose(mend.object[:, 1], 100)
+    np.testing.assert_allclose(mend.object_sure[[0, 40, 94]], [1, 0.5, 0], atol=1e-9)
+    assert not mend.tip_sure.any() and not mend.tip.any()
+
+
+@pytest.mark.parametrize(("apart", "patchs"), [(3, False), (5, True)])
+def test_a_path_that_the_patch_only_repeats_stays_as_it_was_found(apart, patchs, monkeypatch):
+    """Unlike it in a fifth of the frames; nobody says where the hand is."""
+    x = np.linspace(20, 60, 40)
+    own = np.stack([x, np.full(40, 50.0)], 1)
+    other = own + (0, 1) * (apart * (np.arange(40) < 8))[:, None]
+    found = Found(0 * own, own, np.zeros(40), np.ones(40))
+    best = Path(other, np.ones(40), None, 120)
+    mend, _ = mended_by(monkeypatch, best, np.zeros((40, 120, 160, 3), np.uint8), found)
+    np.testing.assert_allclose(mend.object, other if patchs else own)
