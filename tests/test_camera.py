@@ -184,3 +184,30 @@ def test_a_tenth_more_unlike_is_a_vote(unlike, vote, monkeypatch):
         given = iter(given)
         monkeypatch.setattr(camera._Picture, "_off", lambda *_, g=given: next(g))
         assert (picture.votes(picture.plain, np.eye(3)) == said).all()
+
+
+def test_the_extent_is_that_of_all_frames_and_not_of_the_last():
+    sways = np.stack([[[1, 0, x], [0, 1, 0]] for x in (0.0, 12, -12, 0)])
+    assert camera.extent(sways, H, W) == pytest.approx(24 / W)
+
+
+@pytest.mark.parametrize(("height", "found"), [(2.0, 1.0), (0.05, 0.0)])
+def test_a_step_is_as_long_as_the_evidence_is_strong(height, found, monkeypatch):
+    """A hump that goes by a pixel: two levels high it is followed, a twentieth of one it is not,
+    which is far below the noise of two levels that a pixel is taken to have."""
+    monkeypatch.setattr(camera, "_plain", lambda frame, size: frame)
+    y, x = np.mgrid[:90, :120].astype(np.float32)
+    hump, moved = (
+        height * np.exp(-((x - 60 - s) ** 2 + (y - 45) ** 2) / 50).astype(np.float32)
+        for s in (0, 1)
+    )
+    there = camera._Picture(hump, 120).laid(moved, np.eye(3))
+    np.testing.assert_allclose(there[:2, 2] + there[:2, :2] @ (60, 45) - (60, 45), (found, 0),
+                               atol=0.1)  # fmt: skip
+
+
+def test_a_pixel_that_is_shown_in_part_is_not_compared():
+    picture = camera._Picture(np.zeros((90, 120, 3), np.uint8), 120)
+    half = np.array([[1, 0, 0.5], [0, 1, 0], [0, 0, 1.0]])
+    _, inside = picture._off(picture.plain, half)
+    assert inside[:, :-1].all() and not inside[:, -1].any()
