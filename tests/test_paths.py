@@ -116,6 +116,24 @@ def test_what_goes_on_as_fast_as_before_and_after_is_no_cut():
     assert notes
 
 
+@pytest.mark.parametrize(("jump", "is_cut"), [(11, False), (13, True)])
+def test_a_jump_is_twice_as_far_as_the_steps_about_it(jump, is_cut):
+    notes, x = [], 6.0 * np.arange(20)
+    x[10:] += jump - 6
+    longest_piece(tracks(x, cuts=(10,)), False, notes)
+    assert bool(notes) == is_cut
+
+
+def test_the_steps_about_a_jump_are_the_one_before_and_the_one_after():
+    """Of 5, 9 and 5 pixels, and of 5, 12 and 5; farther off it goes by 12 at a time."""
+    for jump, is_cut in ((9, False), (12, True)):
+        steps, notes = np.full(19, 12.0), []
+        steps[8:11] = 5, jump, 5
+        x = np.r_[0, np.cumsum(steps)]
+        longest_piece(tracks(x, cuts=(10,)), False, notes)
+        assert bool(notes) == is_cut
+
+
 def test_a_change_of_the_picture_is_a_cut_where_the_hand_is_not_seen():
     """On either side of it: nobody knows where it went meanwhile."""
     for unseen, is_cut in ((9, True), (10, True), (8, False), (11, False)):

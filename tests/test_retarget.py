@@ -244,7 +244,7 @@ def test_in_a_reach_what_moves_is_the_hand_if_no_tip_is_found(tip, thing, stands
     assert hand.tip_sure.mean() == (thing if stands_in else tip)
 
 
-@pytest.mark.parametrize(("way", "stands_in"), [(15.0, 0), (25.0, 1)])
+@pytest.mark.parametrize(("way", "stands_in"), [(19.0, 0), (21.0, 1)])
 def test_in_a_reach_what_goes_twice_as_far_as_the_tip_is_the_hand(way, stands_in):
     n = 100
     tip, thing = (np.linspace((0, 0), (far, 0), n) for far in (10.0, way))
@@ -535,6 +535,82 @@ def test_only_what_is_slowed_down_by_half_or_more_is_warned_of(steps, warned):
     assert np.abs(np.diff(paced.tip[:-1], axis=0)).max() == pytest.approx(steps / slower)
     assert paced.contact == round(2 * slower) and paced.arrival == round(4 * slower)
     assert bool(paced.warnings) == warned
+
+
+def a_motion(x, z):
+    tip = np.stack([np.array(x, float), np.array(z, float)], 1)
+    return Motion(tip, tip + 1, np.arange(len(tip)) / FPS, 2, 4, np.eye(2, 3), False)
+
+
+def test_an_arm_takes_six_tenths_of_a_second_to_where_the_clip_begins():
+    """Fifteen steps, in which the clip waits; half of the way is gone at half of the time."""
+    there = retarget.approach(a_motion([0.55] * 6, [0.06] * 6), SCENE)
+    assert len(there.tip) == len(there.times) == len(there.object) == 15 + 6
+    assert (there.contact, there.arrival) == (17, 19)
+    assert (there.times[:16] == 0).all() and (there.object[:16] == there.object[0]).all()
+    way = (there.tip[:16, 0] - 0.45) / 0.10
+    np.testing.assert_allclose(way + way[::-1], 1)
+    assert way[0] == 0 and way[3] == pytest.approx(0.0579, abs=1e-4)  # 0.2^3 (10 - 3 + 0.24)
+
+
+@pytest.mark.parametrize(("off", "steps"), [(0.009, 0), (0.011, 15)])
+def test_an_arm_that_is_there_but_for_a_centimetre_needs_no_way_to_it(off, steps):
+    motion = a_motion([0.45] * 6, [0.12 - off] * 6)
+    assert len(retarget.approach(motion, SCENE).tip) == 6 + steps
+
+
+@pytest.mark.parametrize(("share", "usable"), [(0.5, True), (0.55, False)])
+@pytest.mark.parametrize("off", [0.019, 0.021])
+def test_a_hand_may_be_two_centimetres_out_of_the_scene_and_farther_for_half_of_its_way(
+    share, usable, off
+):
+    inside = np.arange(20) >= round(20 * share)
+    x = np.stack([np.full(20, 0.5), np.where(inside, 0.1, SCENE.high[1] + off)], 1)
+    if usable or off < 0.02:
+        retarget._check_reach(x, SCENE)
+    else:
+        with pytest.raises(Unusable, match="55% of the hand's way"):
+            retarget._check_reach(x, SCENE)
+
+
+@pytest.mark.parametrize(("share", "usable"), [(0.84, True), (0.86, False)])
+def test_a_hand_that_goes_along_for_more_than_85_percent_has_not_hit(share, usable):
+    x = np.stack([0.45 + np.linspace(0, share * 0.41, 9), np.zeros(9)], 1)
+    if usable:
+        retarget._limit_hit(x, 0, HIT, [])
+        assert x[-1, 0] == pytest.approx(HIT.high[0])
+    else:
+        with pytest.raises(Unusable, match="pushed and not hit"):
+            retarget._limit_hit(x, 0, HIT, [])
+
+
+@pytest.mark.parametrize(("over", "warned"), [(0.9, False), (1.08, False), (1.12, True)])
+def test_a_hit_that_is_shortened_by_more_than_a_tenth_is_warned_of(over, warned):
+    """It has 10 cm of room from the touch on, where the way before it stays as it is."""
+    x = np.stack([np.r_[0.44, 0.50, 0.54 + 0.10 * over * np.linspace(0, 1, 5)], np.zeros(7)], 1)
+    warnings, before = [], x.copy()
+    retarget._limit_hit(x, 2, HIT, warnings)
+    np.testing.assert_allclose(x[:2], before[:2])
+    np.testing.assert_allclose(x[2:, 0], 0.54 + 0.10 * min(1, over) * np.linspace(0, 1, 5))
+    assert [f"for {10 * over:.0f} cm" in w for w in warnings] == [True] * warned
+
+
+def test_a_hand_that_rests_at_the_clips_beginning_keeps_three_tenths_of_a_second_of_it():
+    """Seven steps and a half, rounded to eight, before its first motion at step 20."""
+    x = np.stack([0.45 + 0.01 * np.clip(np.arange(30) - 20, 0, None), np.full(30, 0.1)], 1)
+    assert retarget._first_step(x, 28, SCENE) == 20 - 8
+
+
+def test_rests_are_counted_in_seconds_and_said_from_three_tenths_on():
+    def rests(steps):
+        x = np.r_[np.arange(10), np.full(steps, 9.0), 9.0 + np.arange(1, 10)]
+        return retarget._rests(np.stack([x, 0 * x], 1))
+
+    assert rests(7) == []
+    assert rests(8) == ["The hand rests for 0.3 s in all on its way; this is kept."]
+    assert rests(25) == ["The hand rests for 1.0 s in all on its way; this is kept."]
+    slow = np.r_[0, np.cumsum(np.r_[np.ones(5), np.full(25, 0.06), np.ones(5)])]
+    assert retarget._rests(np.stack([slow, 0 * slow], 1)) == []  # a twentieth of the speed rests
 
 
 @pytest.mark.parametrize("scene", [SCENE, HIT], ids=["push", "hit"])

@@ -1,0 +1,111 @@
+"""Whether an object is pushed, by hand: a way of 100 pixels, touched at step 20, done at 40."""
+
+import numpy as np
+import pytest
+
+from lbw_minimal.clips.paths import Unusable
+from lbw_minimal.clips.pushing import check_way, gets_faster
+
+TOUCH, THERE, N = 20, 40, 50
+WAY = np.clip((np.arange(N) - TOUCH) / (THERE - TOUCH), 0, 1)
+
+
+def pushed(along=(100.0, 0.0), tip=0.0, aside=0.0, enters=np.nan):
+    """Check a way `along`, pixels; tip, aside (N,): how far the tip is ahead of the object, and
+    the object to the right of its straight way, in parts of the way."""
+    along = np.array(along)
+    thing = np.array([200.0, 100.0]) + WAY[:, None] * along
+    thing += np.multiply.outer(np.broadcast_to(aside, N), [-along[1], along[0]])
+    hand = thing[0] + (WAY + tip)[:, None] * along
+    ends = thing[0].copy(), thing[0] + along
+    check_way(hand, thing, WAY, (TOUCH, THERE), ends, enters)
+
+
+COMES = -0.1 - 2 * np.clip(1 - np.arange(N) / TOUCH, 0, 1)  # from behind, to a tenth of the way
+
+
+@pytest.mark.parametrize(
+    ("along", "enters", "pulls"),
+    [(-100, 0.24, True), (-100, 0.26, False), (100, 0.24, False),
+     (100, 0.76, True), (100, 0.74, False), (-100, 0.76, False)],
+)  # fmt: skip
+def test_an_object_that_comes_towards_the_edge_of_the_arm_is_pulled(along, enters, pulls):
+    """An arm comes from a side if it comes in over the outer quarter of the picture."""
+    if pulls:
+        with pytest.raises(Unusable, match="which so pulls it"):
+            pushed((along, 0), COMES, enters=enters)
+    else:
+        pushed((along, 0), COMES, enters=enters)
+
+
+@pytest.mark.parametrize(
+    ("nearer", "down", "hand"), [(24, 0.3, True), (26, 0.3, False), (0, 0.3, True), (0, 0.2, False)]
+)
+def test_what_goes_with_the_hand_from_the_start_and_comes_down_with_it_is_the_hand(
+    nearer, down, hand
+):
+    """A hand that comes to an object comes nearer by a quarter of its way; a table, or a camera,
+    is not so far out of level."""
+    along = 100 * np.array([np.sqrt(1 - down**2), down])
+    tip = -0.1 - nearer / 100 * np.clip(1 - np.arange(N) / TOUCH, 0, 1)
+    if hand:
+        with pytest.raises(Unusable, match="is the hand"):
+            pushed(along, tip)
+    else:
+        pushed(along, tip)
+
+
+@pytest.mark.parametrize(
+    ("height", "when", "lifted"),
+    [(0.19, 30, False), (0.21, 30, True), (-0.21, 30, True), (0.5, 10, False), (0.5, 45, False)],
+)
+def test_what_leaves_its_straight_way_by_a_fifth_between_touch_and_arrival_is_lifted(
+    height, when, lifted
+):
+    aside = height * (np.arange(N) == when)
+    if lifted:
+        with pytest.raises(Unusable, match="leaves its straight way by 21%"):
+            pushed(tip=COMES, aside=aside)
+    else:
+        pushed(tip=COMES, aside=aside)
+
+
+@pytest.mark.parametrize(
+    ("enters", "why"), [(0.1, "hides it"), (0.5, "in front of it"), (np.nan, "in front of it")]
+)
+@pytest.mark.parametrize(("ahead", "usable"), [(0.24, True), (0.26, False)])
+def test_a_tip_a_quarter_of_the_way_ahead_does_not_push(ahead, usable, enters, why):
+    tip = np.where(np.arange(N) < TOUCH, -0.5, ahead)
+    if usable:
+        pushed(tip=tip, enters=enters)
+    else:
+        with pytest.raises(Unusable, match=why):
+            pushed(tip=tip, enters=enters)
+
+
+@pytest.mark.parametrize(
+    ("ahead_for", "at_touch", "usable"),
+    [(6, 0.0, False), (6, -0.04, False), (6, -0.06, True), (4, 0.0, True)],
+)
+def test_a_hand_that_comes_from_the_front_pushes_if_it_has_gone_behind(ahead_for, at_touch, usable):
+    """Where it was in most of the first half of the time before the touch: the first ten steps."""
+    tip = np.where(np.arange(N) < ahead_for, 0.5, at_touch)
+    if usable:
+        pushed(tip=tip)
+    else:
+        with pytest.raises(Unusable, match="in front of it"):
+            pushed(tip=tip)
+
+
+@pytest.mark.parametrize(("last", "faster"), [(0.94, False), (0.96, True), (1.0, True)])
+def test_a_path_is_broken_off_if_it_ends_at_nearly_its_highest_speed(last, faster):
+    x = np.cumsum(np.r_[np.linspace(0, 1, 10), np.ones(8), np.full(4, last)])
+    assert gets_faster(np.stack([x, 0 * x], 1)) == faster
+
+
+def test_a_speed_is_taken_over_four_steps():
+    """A single step by twice as far is noise: five pixels instead of four, over four steps."""
+    x = np.cumsum(np.r_[np.ones(10), 2, np.ones(10)])
+    path = np.stack([x, 0 * x], 1)
+    assert not gets_faster(path) and gets_faster(path[:14])
+    assert not gets_faster(path[:4])
