@@ -537,6 +537,16 @@ def test_only_what_is_slowed_down_by_half_or_more_is_warned_of(steps, warned):
     assert bool(paced.warnings) == warned
 
 
+@pytest.mark.parametrize("scene", [SCENE, HIT], ids=["push", "hit"])
+def test_a_tip_that_is_seen_past_the_object_before_the_touch_is_laid_behind_it(scene):
+    """Ten steps before the object goes the hand is 5 cm too far, as over the top of it."""
+    way = np.clip((np.arange(40) - 19) / 10, 0, 1)
+    x = np.stack([0.40 + 0.05 * way + 0.10 * (np.arange(40) == 10), np.full(40, 0.05)], 1)
+    laid, thing = retarget._push(x, way, scene, [])
+    assert (laid[:, 0] <= thing[:, 0] - scene.contact + 1e-12).all()
+    assert laid[10, 0] == pytest.approx(scene.start[0] - scene.contact)
+
+
 def a_motion(x, z):
     tip = np.stack([np.array(x, float), np.array(z, float)], 1)
     return Motion(tip, tip + 1, np.arange(len(tip)) / FPS, 2, 4, np.eye(2, 3), False)
