@@ -318,6 +318,86 @@ def test_where_times_are_missing_or_stand_still_the_rate_is_believed():
         assert film.losses == ["Its frames have no time stamps; 30 a second were assumed."]
 
 
+@pytest.mark.parametrize(("back", "second"), [(2.9, False), (3.1, True)])
+def test_times_that_fall_back_by_three_seconds_are_of_another_recording(back, second):
+    """By less they are of frames out of order."""
+    stamps = [0, 1, 2, 3, 4, 4 - back, 5 - back]
+    times = clips._rising(film_of(stamps))
+    if second:
+        assert times == pytest.approx([0, 1, 2, 3, 4, 4.04, 5.04])
+    else:
+        assert times == pytest.approx(sorted(stamps))
+
+
+class Film:
+    """A film of three frames that are as bright as their stream is wide."""
+
+    every, stamps = 1, (0.0, 0.1, 0.2)
+
+    def __init__(self, path, stream, *options):
+        self.stream, self.notes, self.losses = stream, [], []
+        self.frames = np.full((3, 1, 1, 1), stream.width)
+
+    def read(self):
+        pass
+
+
+def tell(monkeypatch, said, *shown):
+    """A file says `said` of itself and has streams: each one's rate, width, whether it moves."""
+    streams = [SimpleNamespace(rate=rate, width=width) for rate, width, _ in shown]
+    moves = {width: moves for _, width, moves in shown}
+    monkeypatch.setattr(clips, "_Film", Film)
+    monkeypatch.setattr(clips, "look", lambda path: (streams, said))
+    monkeypatch.setattr(clips.motion, "moves", lambda frames: moves[frames[0, 0, 0, 0]])
+
+
+@pytest.mark.parametrize(
+    ("captured", "rate", "slow"),
+    [("240", 30, 8), ("120", 30, 4), ("100", 25, 4), ("99", 25, 1), ("60", 25, 1), ("120", 60, 1),
+     ("121", 60, 121 / 60)],
+)  # fmt: skip
+def test_slow_motion_is_a_hundred_frames_a_second_and_twice_the_films_own(
+    captured, rate, slow, monkeypatch
+):
+    """A phone's 60 frames a second, shown as they were taken, are no slow motion."""
+    tell(monkeypatch, {clips.CAPTURED: captured}, (rate, 320, True))
+    clip = read_clip("film.mp4", cuts=False)
+    assert clip.times[-1] == pytest.approx(0.2 / slow) and bool(clip.notes) == (slow != 1)
+
+
+@pytest.mark.parametrize(
+    ("shown", "taken"),
+    [
+        ([(640, False), (320, True)], 2),  # a still title
+        ([(320, True), (640, True)], 2),  # a preview
+        ([(640, True), (320, True)], 1),
+        ([(320, False), (640, False)], 2),
+        ([(64, True), (640, False), (320, True)], 3),
+    ],
+)
+def test_of_several_streams_the_widest_of_those_that_move_is_taken(shown, taken, monkeypatch):
+    tell(monkeypatch, {}, *((25, width, moves) for width, moves in shown))
+    clip = read_clip("film.mp4", cuts=False)
+    assert clip.frames[0, 0, 0, 0] == shown[taken - 1][0]
+    assert clip.notes == [
+        f"Of the file's {len(shown)} streams of pictures, number {taken} was taken."
+    ]
+
+
+@pytest.mark.parametrize(("pause", "end"), [(3, 24), (4, 16)])
+def test_a_pause_of_three_seconds_belongs_to_a_motion_and_a_longer_one_ends_it(pause, end):
+    """A square moves from 10 to 15 s, and after the pause for four seconds more. Key frames come
+    every second."""
+    at = np.cumsum([1 if 10 <= t < 15 or 15 + pause <= t < 19 + pause else 0 for t in range(60)])
+    frames = np.full((60, 84, 84, 3), 100, np.uint8)
+    for frame, x in zip(frames, at, strict=True):
+        frame[30:50, 4 * x : 4 * x + 20] = 220
+    film = clips._Film("film", clips.Stream(0, 640, 480, 1.0, 25.0, 60.0), None, None, None, True)
+    assert film._choose(list(np.arange(60.0)), frames)
+    assert film.start == 8 and film.end == pytest.approx(end, abs=2)
+    assert (film.end > 20) == (pause == 3)
+
+
 def test_of_frames_at_one_moment_the_first_is_kept(monkeypatch):
     class Film:
         every, notes, losses = 1, [], []
