@@ -547,6 +547,16 @@ def test_a_tip_that_is_seen_past_the_object_before_the_touch_is_laid_behind_it(s
     assert laid[10, 0] == pytest.approx(scene.start[0] - scene.contact)
 
 
+def test_a_hand_that_is_a_little_out_of_the_box_is_laid_at_its_edge():
+    """It begins 1.5 cm above the box, which is no reason to leave its beginning out."""
+    t = np.arange(0, 2.6, 1 / 30)
+    tip, thing = push(t)
+    tip[:, 1] += 0.065 * (1 - jerk(t / 0.8))
+    motion = lay(seen((tip, thing), t), SCENE)
+    assert motion.tip[:, 1].max() == pytest.approx(SCENE.high[1])
+    assert (motion.tip >= np.array(SCENE.low) - 1e-9).all()
+
+
 def a_motion(x, z):
     tip = np.stack([np.array(x, float), np.array(z, float)], 1)
     return Motion(tip, tip + 1, np.arange(len(tip)) / FPS, 2, 4, np.eye(2, 3), False)
