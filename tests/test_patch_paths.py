@@ -250,3 +250,23 @@ def test_a_path_that_the_patch_only_repeats_stays_as_it_was_found(apart, patchs,
     best = Path(other, np.ones(40), None, 120)
     mend, _ = mended_by(monkeypatch, best, np.zeros((40, 120, 160, 3), np.uint8), found)
     np.testing.assert_allclose(mend.object, other if patchs else own)
+
+
+@pytest.mark.parametrize(("side", "looked_for"), [(27, 0), (28, 2)])
+def test_a_picture_three_patches_high_is_too_small_for_any(side, looked_for, monkeypatch):
+    monkeypatch.setattr(patches, "_path", lambda small, patch, tip: patch)
+    frame = np.random.default_rng(0).integers(0, 255, (side, 120, 3), dtype=np.uint8)
+    assert len(patches.paths([frame], [(0, np.array([60.0, 14.0]))], None)) == looked_for
+
+
+def test_no_patch_is_looked_for_where_the_detectors_own_path_is_an_objects(monkeypatch):
+    """And one is where it sways, in the same shot of another clip."""
+    waits = np.interp(np.arange(40), [20, 35], [40, 90])
+    sways = 60 - 20 * np.cos(0.7 * np.arange(40))
+    for x, looked_for in ((waits, False), (sways, True)):
+        asked = []
+        monkeypatch.setattr(patches, "paths", lambda *what, to=asked: to.append(what) or [])
+        own = np.stack([x, np.full(40, 50.0)], 1)
+        found = Found(0 * own, own, np.zeros(40), np.ones(40))
+        mend = patches.mended(np.zeros((40, 120, 160, 3), np.uint8), found)
+        assert bool(asked) == looked_for and (mend.object == own).all()
