@@ -94,6 +94,36 @@ def test_a_share_is_of_its_own_number_of_episodes():
     assert controls.share(5, 100) == "5/100 (2-11 %)"
 
 
+def test_controls_play_on_one_core_and_close_a_rivals_world(tmp_path, monkeypatch):
+    """A second thread costs more than it brings, and an open world is a simulator in memory."""
+    threads, closed = [], []
+    env = SimpleNamespace(close=lambda: closed.append(1))
+    monkeypatch.setattr(controls.torch, "set_num_threads", threads.append)
+    monkeypatch.setattr(controls, "compare", lambda *_, **__: {})
+    monkeypatch.setattr(controls.gym, "make", lambda *_, **__: None)
+    monkeypatch.setattr(controls.rivals, "replayed", lambda *_: (None, env))
+    monkeypatch.setattr(controls, "wins", lambda *_: 3)
+    controls.measure("push", tmp_path, 1, 0, {})
+    assert controls.rival_wins("push", tmp_path, 0.01, 5) == 3
+    assert (threads, closed) == ([1], [1])
+
+
+@pytest.mark.parametrize("method", ["learn", "track"])
+def test_a_policy_from_few_numbers_learns_on_one_core(method, monkeypatch):
+    told = []
+    args = SimpleNamespace(evaluate=False, jitter=0.0, seed=0, reward="mended", without=None)
+    some = SimpleNamespace(name="push", args=args, demo=[], random=[], recipe=None, run=None)
+    monkeypatch.setattr(run.torch, "set_num_threads", told.append)
+    for name in ("imitate", "follow"):
+        monkeypatch.setattr(run, name, lambda *_, **__: ("agent", "env"))
+    for name in ("film_robot", "refuse_strangers"):
+        monkeypatch.setattr(run, name, lambda *_: None)
+    monkeypatch.setattr(run.gym, "make", lambda *_, **__: None)
+    monkeypatch.setattr(run.tracks, "draw", lambda demo: None)
+    run.learn(some, None, None) if method == "learn" else run.track(some)
+    assert told == [1]
+
+
 def test_robustness_is_of_twenty_episodes_of_the_shipped_policy(monkeypatch, capsys):
     asked = []
     monkeypatch.setattr(robustness, "robustness", lambda *of: asked.append(of) or {})
