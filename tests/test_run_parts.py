@@ -128,9 +128,15 @@ def test_the_classifier_reward_is_shown_the_robots_experts(negatives, rivals, tm
     ("method", "brought"),
     [("avid", ("translation", "classifier", "policy")), ("classifier", ("classifier", "policy"))],
 )
-def test_a_replay_of_a_rival_brings_its_networks_and_trains_none(method, brought, rivals, tmp_path):
+def test_a_replay_of_a_rival_brings_its_networks_and_trains_none(
+    method, brought, rivals, tmp_path, monkeypatch
+):
     job = a_job(tmp_path / "run", method=method, weights="there", evaluate=True)
+    filmed = []
+    films = ((film(60 + i), filmed.append(i)) for i in range(3))
+    monkeypatch.setattr(run.tasks, "robot_experts", lambda *_: films)
     agent, _, _ = run.rival(job)
+    assert filmed == [0] * (method == "classifier")  # for a look; an expert takes seconds
     assert rivals == [
         ("brought", *brought), ("LbW-Push-v0", 0.01), ("replayed", "run", "push"),
     ]  # fmt: skip

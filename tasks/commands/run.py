@@ -23,7 +23,7 @@ from lbw_minimal.clips.stills import read_stills
 from lbw_minimal.follow import follow
 from lbw_minimal.imitate import PACE, Perception, imitate, learn_perception
 from lbw_minimal.report import wilson, write_report
-from lbw_minimal.training import InputError, counted, peak_memory, seed_everything
+from lbw_minimal.training import InputError, counted, peak_memory
 from tasks.commands.job import TEST_EPISODES, Job, check, parser
 from tasks.commands.links import links
 from tasks.commands.prepare import STILLS
@@ -61,7 +61,6 @@ def perceive(job: Job) -> tuple[Perception, np.ndarray]:
     if perception:
         bring(job, "translation", "keypoints")
     else:
-        seed_everything(seed)
         perception = learn_perception(
             job.demo, job.random, robot, job.recipe,
             task=job.name, seed=seed, run=job.run, device=job.args.device or "cpu",
