@@ -136,6 +136,10 @@ def clips():
         now.update(kind=story.kind, story=story)
         return "room", "ground"
 
+    def tell(rng, kind, T, real=drawings._story):
+        now["told"] = real(rng, kind, T)
+        return now["told"]
+
     def nothing(name):
         return lambda *_: now.update({name: True}) or (lambda t: np.zeros((2, 2, 4), np.uint8))
 
@@ -153,6 +157,7 @@ def clips():
     for name in ("_mark", "_cabinet", "_bystander", "_object"):
         patch.setattr(drawings, name, nothing(name))
     patch.setattr(drawings, "_room", room)
+    patch.setattr(drawings, "_story", tell)
     patch.setattr(drawings, "_lit", lit)
     patch.setattr(drawings, "a_colour", lambda rng, near: f"near the {near}")
     patch.setattr(draw, "over", over)
@@ -210,9 +215,17 @@ def test_a_cabinet_is_where_a_drawer_is_and_an_object_where_something_moves(clip
 
 def test_what_is_reached_for_stands_still(clips):
     """In half of the clips where the hand gets to, else where it comes by."""
+    ends = []
     for c in clips:
         still = np.ptp(c["story"].object, axis=0).max() == 0
         assert still == (c["kind"] in ("reach", "nothing"))
+        if still:
+            first, last = (
+                np.array_equal(c["story"].object[0], c["told"].object[i]) for i in (0, -1)
+            )
+            assert first != last
+            ends.append(last)
+    assert np.mean(ends) == pytest.approx(0.5, abs=0.11)
 
 
 def test_shadows_are_up_to_half_as_dark_and_fall_down_rather_than_up(clips):

@@ -1,12 +1,15 @@
 """The experts as a Minari dataset: what is refused, and what Minari reads back."""
 
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import tasks
+from lbw_minimal.training import InputError
 from tasks.__main__ import main
+from tasks.commands import export
 from tasks.world import load_recordings, record_expert, save_recordings
 
 
@@ -86,3 +89,65 @@ def test_minari_holds_all_the_shipped_experts_of_push(tmp_path, monkeypatch):
     dataset = minari.load_dataset("lbw/push/human-v0")
     assert dataset.total_episodes == 15
     assert dataset.total_steps == sum(len(expert.actions) for expert in experts)
+
+
+@pytest.fixture
+def told(monkeypatch):
+    """What Minari is told, without Minari; of two recordings, each of two steps."""
+    told = {"films": [], "closed": 0}
+
+    class Path:
+        def exists(self):
+            return told.get("exists", False)
+
+    def create(dataset, episodes, **more):
+        told.update(dataset=dataset, episodes=episodes, **more)
+
+    fakes = {
+        "h5py": {}, "minari": {"create_dataset_from_buffers": create},
+        "minari.data_collector": {"EpisodeBuffer": lambda **what: what},
+        "minari.storage": {"get_dataset_path": lambda dataset: Path()},
+    }  # fmt: skip
+    for name, has in fakes.items():
+        monkeypatch.setitem(sys.modules, name, SimpleNamespace(**has))
+
+    def film(env, seed, actions, scatter):
+        told["films"].append((env.arm, seed, len(actions), scatter))
+        fails = seed == told.get("fails")  # or rather loses at its end what it had
+        success = np.array([False, fails, not fails])
+        state, time = np.zeros((3, 9)), np.arange(3) / 25
+        done = SimpleNamespace(success=success, actions=actions, states=state, times=time)
+        return f"film {seed}", None, done
+
+    def bare(name, embodiment="robot"):
+        return SimpleNamespace(arm=embodiment, close=lambda: told.update(closed=1))
+
+    played = [(seed, f"scatter {seed}", np.zeros((2, 3)), "more") for seed in (4, 5)]
+    monkeypatch.setattr(export, "load_recordings", lambda path: played)
+    monkeypatch.setattr(export, "film", film)
+    monkeypatch.setattr(export.tasks, "bare", bare)
+    return told
+
+
+def test_an_episode_is_the_humans_played_again_with_the_environments_rewards(told, capsys):
+    """It is cut off at its end, where the expert has finished, and ends nowhere by itself."""
+    export.main(["push"])
+    assert told["films"] == [("human", 4, 2, "scatter 4"), ("human", 5, 2, "scatter 5")]
+    assert told["dataset"] == "lbw/push/human-v0" and told["env"].arm == "human" and told["closed"]
+    assert told["eval_env"] == "LbW-Push-v0" and not told["jpeg_encoding"]
+    first, _ = told["episodes"]
+    assert (first["seed"], first["observations"]) == (4, "film 4")
+    assert first["rewards"].tolist() == [0.0, 1.0]  # of each step, not of the start
+    assert first["terminations"] == [False, False] and first["truncations"] == [False, True]
+    assert first["infos"]["is_success"].tolist() == [False, False, True]
+    assert "push: 2 episodes" in capsys.readouterr().out
+
+
+def test_nothing_is_exported_twice_or_of_an_expert_that_fails(told):
+    told["fails"] = 5
+    with pytest.raises(InputError, match="played again, seed 5 fails"):
+        export.main(["push"])
+    told["exists"] = True
+    with pytest.raises(InputError, match="minari delete lbw/push/human-v0"):
+        export.main(["push"])
+    assert "dataset" not in told
