@@ -202,3 +202,29 @@ def test_a_smoke_run_is_of_smoke_sizes_and_what_is_set_comes_before_them(tmp_pat
     assert recipe("--set", "policy_steps=900").policy_steps == 900
     assert recipe("--method", "avid").policy_steps == 530
     assert recipe("--method", "tracks").policy_steps == 800
+
+
+def test_what_is_random_is_read_whole_where_a_translation_learns_and_joined_by_further_experts(
+    tmp_path, monkeypatch
+):
+    """The demonstration is learnt from by itself. A replay learns from nothing."""
+    read = []
+
+    def read_video(path, whole=False):
+        read.append((path.name, whole))
+        level = 99 if path.name == "random.mp4" else int(path.stem[-2:])
+        return np.full((2, 84, 84, 3), level, np.uint8)
+
+    def random(*line):
+        argv = [*line, "--threads", "1", "--out", str(tmp_path)]
+        made = job.check("push", job.parser("push").read(argv), argv)
+        return made.random[:, 0, 0, 0].tolist()
+
+    monkeypatch.setattr(job, "read_video", read_video)
+    monkeypatch.setattr(job, "check_weights", lambda *_: None)
+    assert random("--from-scratch", "--videos", "3") == [99, 99, 2, 2, 3, 3]
+    assert read == [*((f"expert_0{i}.mp4", False) for i in (1, 2, 3)), ("random.mp4", True)]
+    assert random("--method", "avid", "--videos", "2") == [99, 99]
+    weights = ["--weights", str(tmp_path / "there")]
+    assert random("--method", "avid", "--evaluate", *weights) == []
+    assert random("--method", "classifier") == []
