@@ -362,11 +362,14 @@ def test_a_picture_is_fitted_in_the_middle_between_two_bars():
 def test_places_come_back_by_the_scale_of_each_axis(monkeypatch):
     """200 x 10 pixels become 84 x 4, from row 40 on: 0.42 and 0.4 of them."""
     places = torch.tensor([[[42.0, 42.0], [84.0, 44.0]]] * 2)
-    monkeypatch.setattr(detector, "both_ways", lambda network, images: images)
+    looks = []
+    monkeypatch.setattr(
+        detector, "both_ways", lambda network, images: looks.append(len(images)) or images
+    )
     monkeypatch.setattr(detector, "read", lambda logits: (places, torch.ones(2, 2)))
     found, sure = Detector(Network())._look(np.zeros((2, 10, 200, 3), np.uint8))
     np.testing.assert_allclose(found[0], [[100, 5], [200, 10]], rtol=1e-5)
-    assert (sure == 1).all()
+    assert (sure == 1).all() and looks == [2]  # and in the mirror
 
 
 def test_the_second_look_takes_in_what_was_found_and_stays_within_the_picture():
@@ -463,6 +466,15 @@ def test_the_loss_is_the_cross_entropy_of_places_and_ten_times_that_of_masks():
     logits[0, 1, -1] = 100.0  # sure that the object is nowhere
     rest = loss(logits, torch.full((1, 2, 42, 42), -50.0), places, masks)
     assert rest.item() == pytest.approx(np.log(1765) / 2, rel=1e-4)
+
+
+def test_a_peak_is_of_nine_cells_and_no_lone_one_however_high():
+    """Cell (30, 30) has 0.3, and each of nine about (10, 10) has 0.07."""
+    p = torch.zeros(1, 2, CELLS, CELLS)
+    p[..., 30, 30], p[..., 9:12, 9:12] = 0.3, 0.07
+    place, sure = read(torch.cat([p.flatten(2), torch.full((1, 2, 1), 0.07)], 2).add(1e-9).log())
+    assert torch.allclose(place[0, 0], torch.tensor([21.0, 21.0]), atol=0.01)
+    assert sure[0, 0].item() == pytest.approx(0.63, abs=0.001)
 
 
 def test_the_target_is_a_gaussian_of_two_pixels():
@@ -605,11 +617,17 @@ def test_a_step_is_no_longer_than_a_gradient_of_1_however_bad_a_batch_is(monkeyp
     monkeypatch.setattr(detector._Pool, "batch", lambda pool, rng, device: nothing)
     monkeypatch.setattr(detector, "Network", Tiny)
     monkeypatch.setattr(detector, "loss", lambda said, *_: 1000 * said)
-    monkeypatch.setattr(
-        torch.optim.AdamW, "step", lambda self, *_: norms.append(weight.grad.norm().item())
-    )
-    detector.train(iterations=2, seed=0)
+    monkeypatch.setattr(detector, "LOG_EVERY", 2)
+
+    def step(adam):
+        norms.append(weight.grad.norm().item())
+        (group,) = adam.param_groups  # it remembers a hundred steps, and forgets a hundredth
+        assert (group["betas"], group["weight_decay"]) == ((0.9, 0.99), 0.01)
+
+    monkeypatch.setattr(torch.optim.AdamW, "step", step)
+    _, log = detector.train(iterations=2, seed=0)
     assert norms == pytest.approx([1, 1], rel=1e-4)
+    assert log == [{"step": 2, "loss": 4000}]  # the mean of two, as the loss itself was
 
 
 def test_a_detector_in_use_is_frozen():
