@@ -441,7 +441,7 @@ def test_the_page_looks_from_where_the_picture_does_with_its_y_axis_up(mirrored)
     for what, (x, y, z) in (("camera.position", scene.eye), ("controls.target", scene.target)):
         (told,) = re.findall(rf"viewer\.{what}\.set\((.*?)\)", page)
         assert [float(n) for n in told.split(",")] == pytest.approx([x, z, -y])
-    assert f"viewer.camera.fov = {FOV};" in page
+    assert f"half = {FOV} * Math.PI / 360" in page
 
 
 def test_a_picture_of_a_tasks_scene_shows_its_table_and_leaves_it_as_it_was(mirrored):
