@@ -6,6 +6,8 @@ import torch
 from torch import nn
 
 from lbw_minimal import cyclegan, gan, munit
+from lbw_minimal.munit_networks import bfloat16
+from lbw_minimal.training import Checkpoint
 
 
 def test_learning_rate_holds_for_half_the_training_and_then_falls_to_nothing():
@@ -146,3 +148,42 @@ def test_each_loss_is_weighted_by_its_own_image_and_its_domains_median(translati
     for name, weights in {"L_D^x": (10.1, 10.3), "L_D^y": (20.2, 20.4)}.items():
         assert [w.item() for w in L[name]] == pytest.approx(weights)
     assert asked == {10.1: 20, 20.2: 20, 10.3: 20, 20.4: 20}
+
+
+def film(dark, bright):
+    """That many black frames, then that many white ones."""
+    return np.repeat(np.uint8([0, 255]), (dark, bright))[:, None, None, None] * np.ones(
+        (84, 84, 3), np.uint8
+    )
+
+
+def test_the_median_image_is_that_of_all_frames():
+    assert (gan.median_image(film(120, 121), torch.device("cpu")) == 1).all()
+
+
+@pytest.mark.parametrize("translation", [munit, cyclegan])
+def test_a_domains_mean_image_is_of_the_whole_video_not_of_how_it_begins(translation):
+    model = translation.MUNIT(2) if translation is munit else translation.CycleGAN(2)
+    mean = translation.mean_images(model, film(40, 40), film(30, 90))
+    assert np.allclose(mean["x"], 255 / 2) and np.allclose(mean["y"], 255 * 3 / 4)
+
+
+@pytest.mark.parametrize("translation", [munit, cyclegan])
+def test_a_finished_training_is_kept_and_not_done_again(translation, tmp_path, monkeypatch):
+    steps = []
+    monkeypatch.setattr(translation, "_update", lambda *args: steps.append(1) or {})
+    for _ in range(2):
+        kept = Checkpoint(tmp_path / "kept", seconds=1e9)
+        translation.train(film(1, 1), film(1, 1), iterations=3, seed=0, width=2, checkpoint=kept)
+    assert len(steps) == 3
+
+
+@pytest.mark.parametrize(
+    ("device", "knows", "used"), [("cpu", True, True), ("cpu", False, False), ("cuda", False, True)]
+)
+def test_a_processor_computes_in_bfloat16_if_it_knows_it_and_a_gpu_always(
+    device, knows, used, monkeypatch
+):
+    monkeypatch.setattr(torch.cpu, "get_capabilities", lambda: {"avx512_bf16": knows})
+    monkeypatch.setattr(torch, "autocast", lambda kind, dtype, enabled: (kind, dtype, enabled))
+    assert bfloat16(torch.device(device)) == (device, torch.bfloat16, used)

@@ -44,3 +44,8 @@ def test_motion_weight_is_one_on_the_median_frame_and_grows_with_the_distance():
 def test_without_a_median_every_pixel_weighs_the_same():
     weight = motion_weight(torch.rand(2, 3, 4, 4), None, 5.0)
     assert weight.shape == (2, 1, 4, 4) and (weight == 1).all()
+
+
+def test_nobody_learns_through_the_motion_weight():
+    images = torch.zeros(1, 3, 2, 2, requires_grad=True)
+    assert not motion_weight(images, torch.ones(1, 3, 2, 2), 5.0).requires_grad

@@ -314,6 +314,8 @@ def test_a_translation_has_the_videos_content_and_the_other_domains_style():
     assert s_y.item() == pytest.approx(r + 0.1)
     two = np.concatenate([robot, human])  # the style is the mean of all frames'
     assert munit.robot_style(model, two).item() == pytest.approx((r + h) / 2 + 0.1)
+    many = np.concatenate([human.repeat(50, 0), robot.repeat(50, 0)])  # more than are asked
+    assert munit.robot_style(model, many).item() == pytest.approx((r + h) / 2 + 0.1)
     grey = lambda v: round((v + 1) * 127.5)  # noqa: E731
     assert (munit.translate(model, human, s_y) == grey(0.5 * h + 2 * (r + 0.1))).all()
     mean = munit.mean_images(model, human, robot)

@@ -136,8 +136,8 @@ def test_pairs_are_near_each_other_or_drawn_freely_and_every_video_is_target_equ
     assert source.min() >= 0 and source.max() < 1050 and target.max() < 1050
     assert 0.47 < (target < 1000).mean() < 0.53
     assert 0.5 < near.mean() < 0.6  # some free pairs are near by chance
-    gaps = np.abs(source - target)
-    assert (gaps == 20).sum() > 20 > (gaps == 21).sum()
+    gaps = source - target
+    assert all((gaps == far).sum() > 20 > (gaps == far + far // 20).sum() for far in (-20, 20))
 
 
 def test_either_frame_of_two_is_source_as_often_as_the_other():
@@ -371,3 +371,26 @@ def test_a_cell_of_the_map_is_centred_on_its_four_pixels():
     rows, columns = seen.sum((0, 1, 3)), seen.sum((0, 1, 2))
     centre = [(w @ at / w.sum()).item() for w in (rows, columns)]
     assert centre == pytest.approx([4 * 10 + 1.5, 4 * 12 + 1.5])
+
+
+def test_the_background_is_the_median_of_the_whole_of_a_long_video(monkeypatch):
+    """Every third of 500 frames; they begin in the dark and are bright in the end."""
+    video, seen = np.zeros((500, 84, 84, 3), np.uint8), []
+    video[240:] = 255
+
+    def update(model, optimizer, x, y, median, *rest, **more):
+        seen.append(median)
+        return {}
+
+    monkeypatch.setattr(tp, "_update", update)
+    tp.train([video], iterations=1, seed=0, K=2, shift=1, hue=2)
+    assert (seen[0] == 1).all()
+
+
+def test_no_frames_have_no_keypoints():
+    assert tp.detect(tp.Transporter(3), np.zeros((0, 84, 84, 3), np.uint8)).shape == (0, 3, 2)
+
+
+def test_a_video_of_one_frame_is_refused_for_nothing_moves_in_it():
+    with pytest.raises(InputError, match=r"video 1 is .* two or more frames"):
+        tp.train([np.zeros((n, 84, 84, 3), np.uint8) for n in (2, 1)], iterations=1, seed=0, K=2)
