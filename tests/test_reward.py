@@ -219,8 +219,15 @@ def test_an_untimed_mended_reward_takes_the_nearest_frame_and_the_nearest_step()
 
 def test_an_episode_gives_the_demonstration_eighty_percent():
     assert LiteralReward(np.zeros((40, 1, 2))).episode == 50
+    assert LiteralReward(np.zeros((43, 1, 2))).episode == 54  # 53.75
     z = line(*np.linspace(0, 1, 40))
     assert MendedReward(z, z).episode == 50 and MendedReward(z, z, horizon=30).episode == 30
+
+
+def test_the_clock_goes_from_0_to_1_and_stays():
+    reward = MendedReward(line(*np.linspace(0, 1, 40)), line(*np.linspace(0, 1, 40)))
+    last = len(reward.z_E) - 1
+    assert [reward.clock(t) for t in (0, last, 10 * last)] == [0, 1, 1]
 
 
 def test_what_moves_less_than_a_tenth_of_the_robots_median_step_is_at_rest():
@@ -228,7 +235,7 @@ def test_what_moves_less_than_a_tenth_of_the_robots_median_step_is_at_rest():
 
     0.019 times five is just below a tenth, so that in each group of frames only the rest stays.
     """
-    robot = line(*np.arange(50.0))
+    robot = line(*np.cumsum(50 * [1, 1, 1, 3, 3]))
     walk = [0, 1, 2, 3]
     crawl = [3 + 0.004 * i for i in range(1, 21)]
     z = prepare(line(*walk, *crawl, 4, 5), robot, speed=False)

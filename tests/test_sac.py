@@ -289,6 +289,32 @@ def test_training_observes_every_state_and_updates_after_the_random_steps(monkey
     assert int(sac.normalise.count) == 63  # a start and twenty steps, three times
 
 
+def test_no_two_episodes_of_a_training_have_one_start_and_each_seed_its_own(monkeypatch):
+    starts = []
+    reset = Walk.reset
+    monkeypatch.setattr(Walk, "reset", lambda env, seed: starts.append(seed) or reset(env, seed))
+    for seed in (0, 1):
+        train(Walk(), steps=50, seed=seed, random_steps=60, width=8, batch=8)
+    assert len(set(starts)) == len(starts) >= 6
+
+
+def test_an_episodes_row_of_the_log_means_what_was_told_over_those_updates_that_told_it():
+    row = module._row(
+        3, 9, [{"reward": 1.0}, {"reward": 2.0}], [{"a": 2.0}, {"a": 4.0, "b": 6.0}], {}
+    )
+    assert (row["return"], row["a"], row["b"]) == (3, 3, 6)
+
+
+def test_the_critics_begin_as_linear_layers_do():
+    """Uniform within one over the root of the number of inputs, here of 4 and of 64."""
+    torch.manual_seed(0)
+    critic = TwinCritic(3, 1, 64)
+    for weight, bound in zip(critic.weights, (0.5, 0.125, 0.125), strict=True):
+        assert 0.9 * bound < weight.abs().max() <= bound
+    for bias, bound in zip(critic.biases[:2], (0.5, 0.125), strict=True):
+        assert 0.9 * bound < bias.abs().max() <= bound
+
+
 def test_the_first_actions_are_uniform_and_the_later_ones_the_actors(monkeypatch):
     acted = []
     act = SAC.act

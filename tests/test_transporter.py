@@ -234,6 +234,8 @@ def test_r2_by_hand_on_a_held_out_set():
     # 2)^0.5.
     assert tp.r2(z, true, z_held, true_held) == pytest.approx([0.5])
     assert tp.pixel_error(z, true, z_held, true_held) == pytest.approx([2**0.5])
+    # A hundredth of a pixel is judged as well.
+    assert tp.r2(z, 0.01 * true, z_held, 0.01 * true_held) == pytest.approx([0.5])
 
 
 def test_without_a_held_out_set_the_last_quarter_is_held_out():
