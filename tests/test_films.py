@@ -53,6 +53,12 @@ def test_a_film_says_what_it_shows_can_be_stopped_and_is_a_picture_on_paper():
     assert "http" not in html
 
 
+def test_a_film_on_paper_is_its_middle_frame():
+    html = Film({"a": shades(0, 60, 120, 180, 240)}).html()
+    data = re.search(r'class="still" src="data:image/png;base64,([^"]+)"', html)[1]
+    assert (np.array(Image.open(io.BytesIO(base64.b64decode(data)))) == 120).all()
+
+
 HOW = """
 (() => {
   const film = document.querySelector("video"), slider = document.querySelector(".film input");

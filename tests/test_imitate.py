@@ -107,6 +107,15 @@ def test_an_episode_ends_where_the_task_or_the_demonstration_does(watcher, horiz
     assert (len(reward.z_E) == 16) == (horizon == 20)
 
 
+def test_a_demonstration_that_is_not_hurried_ends_with_the_task(watcher):
+    env = ToyPush()
+    env.spec = EnvSpec("Toy-v0", max_episode_steps=3)
+    env, reward = watched(env, watcher, frames(6), "literal")
+    env.reset(seed=0)
+    over = [env.step(np.zeros(3, np.float32))[3] for _ in range(3)]
+    assert over == [False, False, True] and reward.episode > 3
+
+
 def level(frames):
     return int(frames[0, 0, 0, 0])
 

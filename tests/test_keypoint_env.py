@@ -44,6 +44,15 @@ def test_only_the_mended_reward_adds_to_the_keypoints(made):
     assert env.spec.kwargs["jitter"] == 0.005
 
 
+def test_what_a_policy_may_see_is_bounded_by_what_differences_can_be(made):
+    """Keypoints lie in -1 to 1, so the three differences of the mended reward in -2 to 2."""
+    reward, env = made
+    space, parts = env.observation_space, 3 if reward == "mended" else 0
+    bound = np.repeat([1, 2], [2 * K, 2 * K * parts])
+    np.testing.assert_array_equal(space.low[: len(bound)], -bound)
+    np.testing.assert_array_equal(space.high[: len(bound)], bound)
+
+
 def test_what_an_idle_robot_earns(made):
     """Nothing from the task, which it does not do; less than nothing for not following."""
     reward, env = made

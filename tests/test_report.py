@@ -79,6 +79,15 @@ def test_wilson_gives_the_published_values():
     np.testing.assert_allclose(report.wilson(5, 10), (0.236593, 0.763407), atol=1e-5)
 
 
+def test_wilson_stays_a_share_where_rounding_would_not():
+    assert all(report.wilson(0, n)[0] >= 0 and report.wilson(n, n)[1] <= 1 for n in range(1, 400))
+
+
+def test_times_are_added_up():
+    page = "".join(report.figures({"stages": {"one": 60.0, "two": 120.0}}))
+    assert re.findall(r"together.*?(3\.0 min)", page, re.S) == ["3.0 min"]
+
+
 def test_wilson_is_symmetric():
     low, high = report.wilson(2, 13)
     assert report.wilson(11, 13) == pytest.approx((1 - high, 1 - low))

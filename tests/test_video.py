@@ -177,6 +177,13 @@ def test_reading_twice_gives_identical_frames(tmp_path):
     )
 
 
+def test_a_pixel_is_the_mean_of_all_that_it_stands_for():
+    """Four columns to one, and only the first of four is white."""
+    frame = np.zeros((336, 336, 3), np.uint8)
+    frame[:, ::4] = 255
+    assert np.abs(video._square(frame, "x").astype(int) - 64).max() <= 1
+
+
 @pytest.mark.parametrize(("height", "width"), [(84, 200), (200, 84)])
 def test_central_square_is_kept(height, width, tmp_path):
     """What is beside it is no border: those are black, and cut off before."""
