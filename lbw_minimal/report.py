@@ -207,7 +207,8 @@ def headline(task: str, metrics: dict[str, Any], method: str = "lbw", goal: str 
         title = f"{name}: {round(result['rate'] * n)} of {n} test episodes succeed"
         low, rate, high = (round(100 * result[key]) for key in ("low", "rate", "high"))
         tiles = [(f"{rate} %", "success rate"), (f"{low}-{high} %", "95 % confidence interval")]
-    notes, learnt = [SMOKE] if settings.get("fast") else [], ""
+    notes = [SMOKE] if settings.get("fast") else []
+    said = [GOAL.format(escape(goal))] if goal else []
     shown = ["reward" if method == "lbw" else "method"]
     if stages := metrics.get("stages"):
         taught = {name: stages[name] for name in LEARNS[method] if name in stages}
@@ -215,13 +216,14 @@ def headline(task: str, metrics: dict[str, Any], method: str = "lbw", goal: str 
             tiles += [(duration(sum(taught.values())), "of learning in this run")]
             shown = ["seed", *shown]  # a replay's is not the one that the policy learnt with
         if not set(LEARNS[method]) <= set(taught):
-            notes += [] if taught else [REPLAY]
-            learnt = LEARNT.format(escape(", ".join(taught))) if taught else ""
+            if taught:
+                said.append(LEARNT.format(escape(", ".join(taught))))
+            else:
+                notes.append(REPLAY)
     tiles += [(str(settings[key]), key) for key in shown if key in settings]
     cells = "".join(f"<div><b>{escape(v)}</b><span>{label}</span></div>" for v, label in tiles)
     noted = "".join(f'<p class="note">{note}</p>' for note in notes)
-    said = " ".join(filter(None, [GOAL.format(escape(goal)) if goal else "", learnt]))
-    noted += f"<p>{said}</p>" if said else ""
+    noted += f"<p>{' '.join(said)}</p>" if said else ""
     return f'<h1>{title}</h1>\n<div class="tiles">{cells}</div>\n{noted}{INTRODUCTION[method]}'
 
 

@@ -70,3 +70,20 @@ def robots_filmed_once():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(tasks, "pace_film", lambda *asked: film(*asked).copy())
         yield
+
+
+@pytest.fixture(scope="module")
+def make():
+    """Environments of the simulator's truth, by task and arm, one of a kind."""
+    import tasks
+
+    made = {}
+
+    def make(name, arm="robot"):
+        if (name, arm) not in made:
+            made[name, arm] = tasks.bare(name, embodiment=arm, observation="state")
+        return made[name, arm]
+
+    yield make
+    for env in made.values():
+        env.close()

@@ -25,21 +25,6 @@ SPANS = {
 }
 
 
-@pytest.fixture(scope="module")
-def make():
-    """Environments of the simulator's truth, one of a kind."""
-    made = {}
-
-    def make(name, arm="robot"):
-        if (name, arm) not in made:
-            made[name, arm] = tasks.bare(name, embodiment=arm, observation="state")
-        return made[name, arm]
-
-    yield make
-    for env in made.values():
-        env.close()
-
-
 def scattered(env, n):
     return np.array([env.reset(seed=i, options={"scatter": True})[0] for i in range(n)])
 

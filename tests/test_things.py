@@ -7,20 +7,16 @@ import tasks
 from tasks.world import FINGER, GREEN, RED, expert_actions
 
 
-@pytest.fixture(scope="module")
-def make():
-    """Environments of the simulator's truth, one of a kind, reset to their fixed start."""
-    made = {}
+@pytest.fixture
+def make(make):
+    """Environments at their fixed start."""
 
-    def make(name, arm="robot"):
-        if (name, arm) not in made:
-            made[name, arm] = tasks.bare(name, embodiment=arm, observation="state")
-        made[name, arm].reset(seed=0)
-        return made[name, arm]
+    def started(name, arm="robot"):
+        env = make(name, arm)
+        env.reset(seed=0)
+        return env
 
-    yield make
-    for env in made.values():
-        env.close()
+    return started
 
 
 def size(p, body, link=-1):
