@@ -21,6 +21,12 @@ LONG = (
 )  # fmt: skip
 
 
+def pytest_addoption(parser):
+    parser.addoption(
+        "--write-golden", action="store_true", help="write the figures of tests/golden/"
+    )
+
+
 def pytest_collection_modifyitems(items):
     ranks = {name: rank for rank, name in enumerate(LONG)}
     items.sort(key=lambda item: ranks.get(item.path.name, len(LONG)))
@@ -41,6 +47,17 @@ def one_thread():
     import torch
 
     torch.set_num_threads(1)
+
+
+@pytest.fixture
+def golden(request):
+    """golden({name: figures}, rtol, atol): are they those that are kept? See `tests/golden.py`."""
+    from tests.golden import check
+
+    def golden(figures, rtol=1e-3, atol=1e-6):
+        check(request.node.nodeid, figures, rtol, atol, request.config.getoption("--write-golden"))
+
+    return golden
 
 
 @pytest.fixture
