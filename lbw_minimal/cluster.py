@@ -45,6 +45,7 @@ def connect(kit: tuple[str, ...] = KIT) -> Any:
     ray = _ray()
     if not ray.is_initialized():
         os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+        os.environ.setdefault("RAY_enable_autoscaler_v2", "1")  # the first takes a second to end
         os.environ.setdefault("RAY_OVERRIDE_RUNTIME_ENV_DEFAULT_EXCLUDES", "")  # ours say it all
         others = [f"/{path.name}" for path in ROOT.iterdir() if path.name not in kit]
         there: dict[str, Any] = {"working_dir": str(ROOT), "excludes": others}
@@ -109,7 +110,7 @@ def on_path(*folders: Path) -> Iterator[None]:
 
 
 def leave() -> None:
-    """Disconnect, if this process is connected, and end a local cluster, which takes a second."""
+    """Disconnect, if this process is connected, and end a local cluster."""
     if ray := sys.modules.get("ray"):
         ray.shutdown()
 
