@@ -144,8 +144,10 @@ class SAC:
         (critic_loss + alpha_loss).backward(inputs=self._of_critic)
         actor_loss.backward(inputs=self._of_actor)
         self.optimizer.step()
-        for slow, fast, pace in zip(self._slow, self._fast, (self.tau, self.average), strict=True):
-            torch._foreach_lerp_(slow, fast, pace)
+        paces = self.tau, self.average
+        with torch.no_grad():  # or what follows would keep the graph of all updates so far
+            for slow, fast, pace in zip(self._slow, self._fast, paces, strict=True):
+                torch._foreach_lerp_(slow, fast, pace)
         return {
             "critic_loss": critic_loss.item(),
             "actor_loss": actor_loss.item(),

@@ -2,7 +2,9 @@
 
 import pytest
 import torch
+from moves import facts, look, noise
 
+from lbw_minimal import augment
 from lbw_minimal.augment import degraded, recoloured, shifted
 
 
@@ -88,3 +90,18 @@ def test_a_poor_camera_is_as_poor_as_it_says():
 def test_a_poor_camera_moves_nothing(dots):
     y, z = dots
     assert torch.allclose(brightest(degraded(20 * y)), z, atol=1 / 42 + 1e-6)  # blur is 3 px wide
+
+
+def test_drawn_changes_are_those_that_were_drawn(golden):
+    """Of sixteen images of two sizes: which were blurred, how far each moved, which hues turned."""
+    figures = facts(augment)
+    for seed, side in ((0, 84), (1, 12)):
+        y = noise(16, 3, side, side, seed=seed)
+        torch.manual_seed(seed)
+        worse, (seen, moved), hued = degraded(y), shifted(y, 5), recoloured(y, 70)
+        figures[f"moved {side}"] = moved
+        for name, images in (("degraded", worse), ("shifted", seen), ("hue", hued)):
+            figures[f"{name} {side}"] = [look(image, 5)[1:] for image in images]
+        for channel in range(3):
+            figures[f"colours {side} {channel}"] = hued[:, channel].mean((1, 2))
+    golden(figures)

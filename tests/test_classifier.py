@@ -5,6 +5,7 @@ from inspect import signature
 import numpy as np
 import pytest
 import torch
+from moves import Kept, blocks, columns, facts, layers, look, moved, slopes, weights
 
 import tasks
 from lbw_minimal import classifier, transporter, video
@@ -269,3 +270,45 @@ def test_saved_model_comes_back_and_no_other_does(tmp_path):
     transporter.save(path, transporter.Transporter(), "push")
     with pytest.raises(InputError, match="not the weights of a goal classifier"):
         classifier.load(path, "push")
+
+
+# Golden figures -----------------------------------------------------------------------------------
+
+
+def test_the_constants_of_the_classifier_are_those_of_the_shipped_results(golden):
+    golden(facts(classifier))
+
+
+def test_the_classifier_begins_and_computes_as_it_did(golden):
+    torch.manual_seed(0)
+    model, images = GoalClassifier(), classifier.small_images(blocks(3, 1))
+    figures = {"layers": layers(model), "logits": model(images), "seen": look(images)}
+    figures["begin"] = [p.abs().mean().item() for p in model.parameters()]
+    paid = ClassifierReward(model, 0.02)
+    figures["paid"] = [paid(frame)[0] for frame in blocks(6, 2)]
+    figures["split"] = [len(part) for n in (2, 9, 30, 31) for part in goal_frames([numbered(n)])]
+    golden(figures | {"logits of frames": classifier.logits(model, blocks(4, 3))})
+
+
+def test_a_first_update_of_the_classifier_has_the_gradients_it_had(golden):
+    torch.manual_seed(0)
+    model, rng = GoalClassifier(), np.random.default_rng(1)
+    goals, others = classifier.small_images(blocks(3, 1)), classifier.small_images(blocks(5, 2))
+    images, labels = classifier._draw(goals, others, rng)
+    figures = {"drawn": images[:, 0, 0, 0]}
+    down = torch.optim.SGD(model.parameters(), 0.01)
+    figures["loss"] = classifier._update(model, down, images, labels, rng)
+    golden(figures | {"gradients": slopes(model)})
+
+
+def test_three_steps_of_the_classifiers_training_go_where_they_went(golden, monkeypatch):
+    monkeypatch.setattr(classifier, "LOG_EVERY", 2)
+    kept = Kept()
+    model, log = classifier.train(
+        blocks(4, 1), blocks(9, 2), iterations=3, seed=5, checkpoint=kept
+    )  # fmt: skip
+    torch.manual_seed(5)
+    figures = {"moved": moved(weights(GoalClassifier()), model), "forced": kept.forced}
+    for k in ("lr", "betas", "eps", "weight_decay"):
+        figures[f"adam's {k}"] = kept.states[-1]["optimizer"]["param_groups"][0][k]
+    golden(figures | columns(log) | {"state": [*kept.states[0]]})

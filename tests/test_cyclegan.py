@@ -1,13 +1,17 @@
 """CycleGAN: losses and pool against numbers worked out by hand, and a training that resumes."""
 
+from contextlib import nullcontext
+
 import numpy as np
 import pytest
 import torch
+from moves import Kept, blocks, columns, facts, layers, look, moved, slopes, weights
 from torch import nn
 from toy_videos import DiesAfter, Killed, squares
 
 from lbw_minimal import cyclegan, gan
 from lbw_minimal.cyclegan import CycleGAN, ImagePool, discriminator_losses, generator_losses
+from lbw_minimal.images import to_images
 from lbw_minimal.munit_networks import MUNIT, Critic
 from lbw_minimal.training import Checkpoint, InputError, load_state, save_state
 
@@ -319,3 +323,85 @@ def test_short_training_halves_the_cycle_loss_and_takes_on_the_robots_colours(mo
         assert log[-1][name] < 0.5 * log[0][name]
     made = cyclegan.translate(model, human)
     assert np.abs(np.median(made, (0, 1, 2)) - 100).max() < 15  # the robot's wall; the human's: 150
+
+
+# Golden figures -----------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def exact(monkeypatch):
+    """Single precision on every processor; some know another."""
+    monkeypatch.setattr(cyclegan, "bfloat16", lambda device: nullcontext())
+
+
+def test_the_constants_of_cyclegan_are_those_of_the_shipped_results(golden):
+    golden(facts(cyclegan))
+
+
+def test_cyclegans_generators_begin_and_compute_as_they_did(golden):
+    torch.manual_seed(0)
+    model, x = CycleGAN(3, blocks=2), to_images(blocks(2, 1))
+    with torch.no_grad():
+        model.G.out.weight.mul_(20)
+    figures = {"sizes": str(CycleGAN().sizes), "layers": layers(CycleGAN(4))[:24]}
+    figures["begin"] = [p.std().item() for p in model.parameters()]
+    golden(figures | {"G": look(model.y_of_x(x)), "F": look(model.x_of_y(x))})
+
+
+@pytest.mark.parametrize("weighted", [True, False])
+def test_a_first_update_of_cyclegan_has_the_losses_and_gradients_it_had(
+    weighted, exact, golden, monkeypatch
+):
+    """With pools that are full of other images, so that some are exchanged."""
+    monkeypatch.setattr(cyclegan, "POOL", 3)
+    torch.manual_seed(0)
+    model, critics = CycleGAN(2, blocks=1), nn.ModuleDict({d: Critic(8) for d in "xy"})
+    with torch.no_grad():
+        for generator in (model.G, model.F):
+            generator.out.weight.mul_(10)
+    x, y = to_images(blocks(4, 1, 0, 200)), to_images(blocks(4, 2, 60, 256))
+    pools = {d: ImagePool(seed) for d, seed in (("x", 5), ("y", 6))}
+    for d, seed in (("x", 7), ("y", 8)):
+        pools[d].images = [*to_images(blocks(3, seed))]
+    medians = [to_images(blocks(1, seed, 40, 220)) for seed in (3, 4)]
+    adams = [torch.optim.SGD(network.parameters(), 0.01) for network in (model, critics)]
+    medians = medians if weighted else [None, None]
+    told = cyclegan._update(model, critics, pools, *adams, x, y, medians)
+    figures = {"generators": slopes(model), "critics": slopes(critics)}
+    figures |= {f"pool {d}": [v.mean().item() for v in pools[d].images] for d in "xy"}
+    golden(figures | told)
+
+
+def test_three_steps_of_cyclegans_training_go_where_they_went(exact, golden, monkeypatch):
+    monkeypatch.setattr(cyclegan, "LOG_EVERY", 1)
+    monkeypatch.setattr(cyclegan, "POOL", 4)
+    kept = Kept()
+    human, robot = blocks(5, 5, 0, 200), blocks(4, 6, 60, 256)
+    small = dict(iterations=3, seed=2, width=2, batch=3)
+    model, log = cyclegan.train(human, robot, **small, motion=True, checkpoint=kept)
+    figures = columns(log) | {"state": [*kept.states[0]], "forced": kept.forced}
+    torch.manual_seed(2)
+    networks = {"model": CycleGAN(2), "critics": nn.ModuleDict({d: Critic() for d in "xy"})}
+    for name, network in networks.items():
+        before = weights(network)
+        network.load_state_dict(kept.states[2][name])
+        figures[name] = moved(before, network)
+    figures["average"] = moved(weights(networks["model"]), model)
+    for adam in ("adam_G", "adam_D"):
+        groups = [state[adam]["param_groups"][0] for state in kept.states]
+        figures |= {f"{adam} {k}": [g[k] for g in groups] for k in ("lr", "eps", "weight_decay")}
+    for pool in ("pool_x", "pool_y"):
+        figures[pool] = [v.mean().item() for v in kept.states[2][pool]["images"]]
+        figures[f"{pool}'s dice"] = str(kept.states[2][pool]["rng"]["state"])
+    golden(figures)
+
+
+def test_cyclegans_translations_look_as_they_looked(golden):
+    torch.manual_seed(0)
+    model, human, robot = CycleGAN(2, 1), blocks(70, 7, 0, 200), blocks(67, 8, 60, 256)
+    with torch.no_grad():
+        for generator in (model.G, model.F):
+            generator.out.weight.mul_(20)
+    figures = {"translated": look(cyclegan.translate(model, human) / 1.0, 1)}
+    mean = cyclegan.mean_images(model, human, robot)
+    golden(figures | {name: look(image) for name, image in mean.items()})

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import torch
+from moves import blocks, facts, look, noise
 from torch import nn
 
 from lbw_minimal import cyclegan, gan, munit
@@ -187,3 +188,42 @@ def test_a_processor_computes_in_bfloat16_if_it_knows_it_and_a_gpu_always(
     monkeypatch.setattr(torch.cpu, "get_capabilities", lambda: {"avx512_bf16": knows})
     monkeypatch.setattr(torch, "autocast", lambda kind, dtype, enabled: (kind, dtype, enabled))
     assert bfloat16(torch.device(device)) == (device, torch.bfloat16, used)
+
+
+def test_the_constants_of_translations_are_those_of_the_shipped_results(golden):
+    golden(facts(gan))
+
+
+def test_what_translations_share_computes_what_it_computed(golden):
+    """Weighted errors of two scales that are not square, draws, medians, rates and averages."""
+    rng, cpu = np.random.default_rng(1), torch.device("cpu")
+    a, b, weight = (
+        noise(2, 3, 84, 84, seed=0),
+        noise(2, 3, 84, 84, seed=1),
+        torch.ones(2, 1, 84, 84),
+    )
+    weight[:, :, :, 50:], weight[0, :, :9] = 5.0, 21.0
+    scores = [noise(2, 1, 10, 10, seed=2), noise(2, 1, 5, 5, seed=3)]
+    figures = {"l1": [gan.l1(a, b).item(), gan.l1(a, b, weight).item()]}
+    figures["squares"] = [gan.least_squares(scores, t, weight).item() for t in (0.0, 1.0)]
+    D = lambda v: [s + v.mean() for s in scores]  # noqa: E731
+    figures["critic"] = gan.critic_loss(D, a + 1, b - 2, weight, weight.flip(3)).item()
+    frames = blocks(7, 4)
+    figures["drawn"] = [look(gan.draw(frames, 9, rng, cpu)[:, :, 5, 5], 27) for _ in range(2)]
+    figures["median"] = look(gan.median_image(frames[:6], cpu)[:, :, ::14, ::14], 20)
+    adam, average, model = gan.adam(nn.Linear(2, 2), 3.0), nn.Linear(1, 2), nn.Linear(1, 2)
+    figures["rates"] = []
+    for done in (0.0, 0.4, 0.5, 0.6, 0.99):
+        gan.set_rate(adam, 3.0, done)
+        figures["rates"].append(adam.param_groups[0]["lr"])
+    for network, value in ((average, 0.0), (model, 1.0)):
+        for p in network.parameters():
+            nn.init.constant_(p, value)
+    figures["averages"] = []
+    for step in (1, 2, 60, 1989, 1991, 9000):
+        gan.follow(average, model, step)
+        figures["averages"].append(1 - average.bias[0].item())
+    options = {k: adam.param_groups[0][k] for k in ("betas", "eps", "weight_decay", "amsgrad")}
+    repainted = gan.repaint(blocks(65, 5), lambda v: v.flip(3) / 2, cpu)
+    figures |= {"adam": str(options), "repainted": look(repainted[:, 5::14, 5::14])}
+    golden(figures)

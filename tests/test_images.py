@@ -2,7 +2,9 @@
 
 import numpy as np
 import torch
+from moves import facts, noise
 
+from lbw_minimal import images
 from lbw_minimal.images import median_frame, motion_weight, spread, to_frames, to_images
 
 
@@ -49,3 +51,18 @@ def test_without_a_median_every_pixel_weighs_the_same():
 def test_nobody_learns_through_the_motion_weight():
     images = torch.zeros(1, 3, 2, 2, requires_grad=True)
     assert not motion_weight(images, torch.ones(1, 3, 2, 2), 5.0).requires_grad
+
+
+def test_images_are_converted_as_they_were(golden):
+    """Between grey levels and beyond them, in halves of numbers too; even numbers of frames."""
+    frames = np.random.default_rng(0).integers(0, 256, (6, 2, 3, 3), np.uint8)
+    v = 0.7 * noise(2, 3, 3, 2, seed=1)
+    median = torch.zeros(1, 3, 3, 2) + torch.tensor([0.1, -0.4, 0.3]).view(3, 1, 1)
+    golden(facts(images) | {
+        "images": to_images(frames[:2] / 1.5),
+        "frames": to_frames(v),
+        "in halves": to_frames(v.half()),
+        "spread": np.concatenate([spread(np.arange(n), 8) for n in (3, 8, 17, 100)]),
+        "median": median_frame(frames),
+        "weights": motion_weight(v, median, 20.0),
+    })  # fmt: skip

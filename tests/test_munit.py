@@ -1,14 +1,17 @@
 """MUNIT: the losses against numbers worked out by hand, the parts, and a training that resumes."""
 
 from contextlib import nullcontext
+from copy import deepcopy
 
 import numpy as np
 import pytest
 import torch
+from moves import Kept, blocks, columns, facts, layers, look, moved, slopes, weights
 from torch import nn
 from toy_videos import DiesAfter, Killed, squares
 
-from lbw_minimal import munit
+from lbw_minimal import munit, munit_networks
+from lbw_minimal.images import to_images
 from lbw_minimal.munit import MUNIT, discriminator_losses, generator_losses, swap
 from lbw_minimal.munit_networks import adain
 from lbw_minimal.training import Checkpoint, InputError, save_state
@@ -377,3 +380,90 @@ def test_a_critics_scores_look_at_patches_of_22_and_44_pixels():
 def test_the_critics_leak_a_fifth_as_published():
     slopes = [m.negative_slope for m in munit.Critic().modules() if isinstance(m, nn.LeakyReLU)]
     assert slopes == 6 * [0.2]
+
+
+# Golden figures -----------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def exact(monkeypatch):
+    """Single precision on every processor; some know another."""
+    monkeypatch.setattr(munit, "bfloat16", lambda device: nullcontext())
+
+
+def domains(n):
+    """So many images of a dark domain and of a bright one, and two medians."""
+    x, y = to_images(blocks(n, 1, 0, 200)), to_images(blocks(n, 2, 60, 256))
+    return x, y, [to_images(blocks(1, seed, 40, 220)) for seed in (3, 4)]
+
+
+def test_the_constants_of_munit_are_those_of_the_shipped_results(golden):
+    golden(facts(munit) | facts(munit_networks))
+
+
+def test_munits_networks_begin_and_compute_as_for_the_shipped_results(golden):
+    torch.manual_seed(0)
+    model, critic = MUNIT(3, style_dim=5), munit.Critic()
+    x, y, _ = domains(2)
+    figures = {"sizes": str(MUNIT().sizes), "layers": layers(MUNIT()), "critic": layers(critic)}
+    figures["begin"] = [p.std().item() for p in model.parameters() if p.ndim > 1]
+    for domain, image in (("x", x), ("y", y)):
+        c, s = model.content(image, domain), model.style(image, domain)
+        figures |= {f"content {domain}": look(c), f"style {domain}": look(s, 10)}
+        figures[f"decoded {domain}"] = look(model.decode(c, 9 * s, domain))
+    figures |= {f"scores {i}": look(score) for i, score in enumerate(critic(x))}
+    golden(figures)
+
+
+@pytest.mark.parametrize("weighted", [True, False])
+def test_a_first_update_of_munit_has_the_losses_and_gradients_it_had(weighted, exact, golden):
+    torch.manual_seed(0)
+    model, critics = MUNIT(2), nn.ModuleDict({d: munit.Critic(8) for d in "xy"})
+    x, y, medians = domains(2)
+    with torch.no_grad():
+        for decoder in model.G.values():
+            decoder.out.weight.mul_(10)  # or styles would hardly show
+    adams = [torch.optim.SGD(network.parameters(), 0.01) for network in (model, critics)]
+    old = [p.clone() for p in model.parameters()]
+    told = munit._update(model, critics, *adams, x, y, medians if weighted else [None, None])
+    figures = {"generators": slopes(model), "critics": slopes(critics)}
+    change = [(p - q).norm().item() for p, q in zip(old, model.parameters(), strict=True)]
+    golden(figures | told | {"change": sum(change)})
+
+
+def test_three_steps_of_munits_training_go_where_they_went(exact, golden, monkeypatch):
+    """Losses, how far off the mean images are, and how far all weights have moved in each step."""
+    monkeypatch.setattr(munit, "LOG_EVERY", 1)
+    kept = Kept()
+    model, log = munit.train(
+        blocks(5, 5, 0, 200), blocks(4, 6, 60, 256), iterations=3, seed=2, width=2, batch=3,
+        checkpoint=kept,
+    )  # fmt: skip
+    figures = columns(log) | {"state": [*kept.states[0]], "forced": kept.forced}
+    torch.manual_seed(2)
+    networks = {"model": MUNIT(2), "critics": nn.ModuleDict({d: munit.Critic() for d in "xy"})}
+    networks["average"] = deepcopy(networks["model"])
+    for name, network in networks.items():
+        before = weights(network)
+        network.load_state_dict(kept.states[2][name])
+        figures[name] = moved(before, network)
+    for adam in ("adam_G", "adam_D"):
+        groups = [state[adam]["param_groups"][0] for state in kept.states]
+        figures |= {f"{adam} {k}": [g[k] for g in groups] for k in ("lr", "eps", "weight_decay")}
+    golden(figures | {"returned": moved(weights(model), networks["average"])})
+
+
+def test_munits_translations_look_as_they_looked(golden):
+    """More frames than any one batch, or any mean, takes."""
+    torch.manual_seed(0)
+    model, human, robot = MUNIT(2), blocks(70, 7, 0, 200), blocks(67, 8, 60, 256)
+    with torch.no_grad():
+        for decoder in model.G.values():
+            decoder.out.weight.mul_(20)
+    style = munit.robot_style(model, robot)
+    figures = {
+        "style": style,
+        "translated": look(munit.translate(model, human, 5 * style) / 1.0, 1),
+    }
+    mean = munit.mean_images(model, human, robot)
+    golden(figures | {name: look(image) for name, image in mean.items()})

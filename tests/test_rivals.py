@@ -6,6 +6,8 @@ import re
 import gymnasium as gym
 import numpy as np
 import pytest
+import torch
+from moves import blocks, facts, look
 
 import tasks
 from lbw_minimal import classifier, cyclegan, rivals, sac_ae
@@ -172,6 +174,52 @@ def test_the_classifier_reward_hands_all_it_was_given_on(tmp_path, monkeypatch):
     np.testing.assert_array_equal(negative[-6:], random)
     for k in (options, given["policy"][1]):
         assert (k["seed"], k["device"]) == (5, "there")
+
+
+@pytest.mark.parametrize("negatives", [True, False])
+def test_all_that_the_stages_of_a_rival_are_given_and_leave_is_what_it_was(
+    negatives, golden, tmp_path, monkeypatch
+):
+    """Every argument of every training, the frames among them, and every file."""
+    given = {}
+
+    def trains(name, result):
+        def train(*frames, **options):
+            given[name] = frames
+            told = {k: v for k, v in options.items() if k != "checkpoint"}
+            given[f"{name}'s options"] = str(sorted(told.items()))
+            return result, [{"row": name}]
+
+        return train
+
+    torch.manual_seed(0)
+    monkeypatch.setattr(cyclegan, "train", trains("translation", cyclegan.CycleGAN(2, 1)))
+    monkeypatch.setattr(classifier, "train", trains("classifier", classifier.GoalClassifier()))
+    monkeypatch.setattr(sac_ae, "train", trains("policy", sac_ae.SACAE(3)))
+    recipe = Recipe(
+        human_frames=1, robot_frames=2, munit_iterations=3, munit_width=4, motion=True,
+        classifier_iterations=6, policy_steps=7, pixel_updates=8, hold=9, entropy=-1.5, clip=2.5,
+        random_negatives=negatives,
+    )  # fmt: skip
+    films = [blocks(n, n) for n in (23, 40, 31, 6, 9)]
+    _, env = rivals.avid_m(
+        reach(), films[:3], *films[3:], recipe, run=run_in(tmp_path), task="reach", seed=5
+    )
+    layers, inner = [], env
+    while isinstance(inner, gym.Wrapper):
+        layers, inner = [*layers, type(inner).__name__], inner.env
+    figures = facts(rivals) | {"wrappers": layers[:4], "seen": str(env.observation_space.shape)}
+    figures |= {"files": sorted(path.name for path in tmp_path.iterdir())}
+    (policy_env,) = given.pop("policy")
+    assert policy_env is env
+    for name, value in given.items():
+        if isinstance(value, tuple):
+            value = [[len(frames), *look(frames / 1.0, 3)] for frames in value]
+        figures[name] = value
+    metrics = json.loads((tmp_path / "metrics.json").read_text())
+    figures |= {"metrics": [*metrics], "stages": [*metrics["stages"]]}
+    figures["longest"] = classifier.load(tmp_path / "classifier.safetensors", "reach").longest
+    golden(figures)
 
 
 def test_a_rivals_policy_is_replayed_on_its_own_task_alone(tmp_path, monkeypatch):

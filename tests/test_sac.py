@@ -6,11 +6,13 @@ import gymnasium as gym
 import numpy as np
 import pytest
 import torch
+from moves import Kept, columns, facts, layers, look, moved, noise, slopes, weights
 
+from lbw_minimal import replay, sac_networks
 from lbw_minimal import sac as module
 from lbw_minimal.replay import ReplayBuffer
 from lbw_minimal.sac import SAC, best_actor, train
-from lbw_minimal.sac_networks import Actor, TwinCritic
+from lbw_minimal.sac_networks import Actor, Normaliser, TwinCritic
 from lbw_minimal.training import Checkpoint, InputError, load_state, save_state
 
 
@@ -224,6 +226,14 @@ def test_the_target_critics_follow_by_tau():
         old, sac.target.parameters(), sac.critic.parameters(), strict=True
     ):
         assert torch.allclose(target, 0.75 * before + 0.25 * critic, atol=1e-6)
+
+
+def test_what_follows_slowly_keeps_no_graph_of_the_updates():
+    """Each of 40,000 updates would stay in memory, half a gigabyte in the end."""
+    sac = small()
+    sac.update(batch_of())
+    for network in (sac.target, sac.test_actor):
+        assert not any(p.requires_grad for p in network.parameters())
 
 
 def test_running_normalisation_is_that_of_all_observations():
@@ -658,3 +668,155 @@ def test_it_learns_stable_baselines3s_identity_task(seed):
             obs, reward, _, ended, _ = env.step(sac.act(obs, deterministic=True))
             returns[-1] += reward
     assert log[0]["return"] < 60 and np.mean(returns) >= 90
+
+
+# Golden figures -----------------------------------------------------------------------------------
+
+
+def test_the_constants_of_sac_are_those_of_the_shipped_results(golden):
+    golden(facts(module) | facts(sac_networks) | facts(replay))
+
+
+def test_sacs_networks_begin_and_compute_as_they_did(golden):
+    """Standard observations, and such as are cut off; means and draws; what has been observed."""
+    torch.manual_seed(0)
+    actor, critic, normalise = Actor(3, 2, 16), TwinCritic(3, 2, 16), Normaliser(3)
+    s, a = 2 * noise(5, 3, seed=1), noise(5, 2, seed=2).tanh()
+    figures = {"layers": layers(actor) + layers(critic) + layers(normalise)}
+    figures["begin"] = [p.std().item() for p in (*actor.parameters(), *critic.parameters())]
+    mean, log_std = actor(s)
+    figures |= {"mean": mean, "log std": log_std, "Q": critic(s, a)}
+    torch.manual_seed(1)
+    figures |= dict(zip(("drawn", "density"), actor.sample(s), strict=True))
+    for x in noise(4, 3, seed=3) * torch.tensor([1.0, 0.004, 30.0]):
+        normalise.observe(x.numpy())
+    figures |= {name: v for name, v in normalise.state_dict().items()}
+    figures["normal"] = normalise(s * torch.tensor([9.0, 0.03, 40.0]))
+    golden(figures)
+
+
+def mixed(n=6):
+    """Transitions of which some end, with rewards and frames that differ in size."""
+    batch = {"obs": noise(n, 3, seed=1), "action": noise(n, 2, seed=2).tanh()}
+    batch |= {"next_obs": 2 * noise(n, 3, seed=3) - 0.3, "reward": 3 * noise(n, seed=4)}
+    return batch | {"terminal": (torch.arange(n) % 3 == 1).float()}
+
+
+def test_a_first_update_of_sac_has_the_losses_and_gradients_it_had(golden):
+    """A temperature, a discount and normalised observations that show."""
+    sac = small(alpha=0.7, gamma=0.8, average=0.1, tau=0.3)
+    for x in noise(5, 3, seed=5) * torch.tensor([2.0, 0.5, 1.0]):
+        sac.observe(x.numpy())
+    for p in (*sac.target.parameters(), *sac.test_actor.parameters()):
+        p.mul_(1.5)  # not where the fast ones are
+    torch.manual_seed(1)
+    figures = {"y": sac.critic_target(mixed())} | sac.update(mixed())
+    for name in ("critic", "actor", "target", "test_actor"):
+        figures[name] = slopes(getattr(sac, name))
+    figures |= {"of log alpha": sac.log_alpha.grad, "followed": look(sac.target.weights[0])}
+    golden(figures | {"averaged": look(sac.test_actor.net[0].weight)})
+
+
+def test_three_updates_of_sac_move_its_networks_as_far_as_they_did(golden):
+    """At rates that differ, each kind of network by its own."""
+    sac = small(critic_lr=3e-3, actor_lr=2e-3, tau=0.02)
+    names = ("actor", "critic", "target", "test_actor")
+    before = {name: weights(getattr(sac, name)) for name in names}
+    told = []
+    for seed in range(3):
+        torch.manual_seed(seed)
+        told.append(sac.update(mixed()))
+    figures = {name: moved(before[name], getattr(sac, name)) for name in names}
+    kept = sac.state_dict()
+    figures |= {"state": [*kept], "log alpha": kept["log_alpha"]}
+    groups = kept["optimizer"]["param_groups"]
+    figures |= {k: [g[k] for g in groups] for k in ("lr", "betas", "eps", "weight_decay")}
+    golden(figures | columns(told))
+
+
+def test_rates_and_target_entropies_fall_as_they_fell(golden):
+    sac, rows = SAC(2, 3, width=4, critic_lr=1e-3, actor_lr=3e-4, entropy=-0.7), []
+    for passed in (0.0, 0.29, 0.31, 0.5, 0.69, 0.71, 0.99, 1.0, 1.2):
+        sac.anneal(passed)
+        rates = [group["lr"] for group in sac.optimizer.param_groups]
+        rows.append([*rates, sac.target_entropy])
+    golden({"rates and entropy": rows})
+
+
+class Room(gym.Env):
+    """A point in a plane is paid for its place; its way ends at a wall or after nine steps."""
+
+    observation_space = gym.spaces.Box(-9, 9, (2,), np.float32)
+    action_space = gym.spaces.Box(-1, 1, (3,), np.float32)
+
+    def __init__(self):
+        self.seeds, self.actions = [], []
+
+    def reset(self, seed=None, options=None):
+        super().reset(seed=seed)
+        self.seeds.append(seed)
+        self.t, self.x = 0, self.np_random.uniform(-1, 0.5, 2)
+        return self.x.astype(np.float32), {}
+
+    def step(self, action):
+        self.actions.append(action)
+        self.t, self.x = self.t + 1, self.x + 0.3 * action[:2] + [0.1, 0.1 * action[2]]
+        left, right = map(float, self.x)
+        info = {"reward_parts": {"left": left, "right": -right}, "is_success": left > 0.5}
+        return self.x.astype(np.float32), left - right, left > 0.9, self.t >= 9, info
+
+
+def test_a_short_training_of_sac_goes_as_it_went(golden, monkeypatch, buffers):
+    """Random steps, updates, an evaluation, candidates, and the trials that choose one of them."""
+    monkeypatch.setattr(module, "WINDOW", 2)
+    env, kept, chosen = Room(), Kept(), []
+    best = module.best_actor
+    monkeypatch.setattr(
+        module, "best_actor", lambda *of: chosen.append(of[2]) or best(*of)
+    )  # fmt: skip
+    sac, log = train(
+        env, steps=52, seed=4, random_steps=33, width=8, batch=7, checkpoint=kept,
+        evaluate=lambda agent: {"tried": agent.alpha}, evaluate_every=3,
+    )  # fmt: skip
+    n = len(buffers[0])
+    figures = {f"kept: {k}": look(v[:n], 20) for k, v in buffers[0].data.items()}
+    figures |= {"seeds": str(env.seeds), "steps": len(env.actions), "state": [*kept.states[0]]}
+    figures |= {"forced": kept.forced, "capacity": buffers[0].capacity}
+    figures["returns"] = [c["return"] for c in kept.states[-1]["candidates"]]
+    figures["actions"] = look(np.array(env.actions), 30)
+    figures["averaged"] = [look(a["net.4.bias"], 6) for a in chosen[0]]
+    figures["acts"] = sac.act(np.float32([0.2, -0.4]), deterministic=True)
+    golden(figures | columns(log))
+
+
+def test_a_random_action_is_held_and_drawn_as_it_was(golden):
+    env, kept = Room(), Kept()
+    agent, buffer = SAC(2, 3, width=4), ReplayBuffer(2, 3, 40)
+    module.learn(
+        env, agent, buffer, np.random.default_rng(3), steps=20, seed=1, checkpoint=kept,
+        evaluate=None, evaluate_every=1, updates=1, random_steps=90, batch=4, hold=4,
+    )  # fmt: skip
+    golden({"actions": buffer.data["action"][: len(buffer), 0], "steps": len(buffer)})
+
+
+def test_what_a_buffer_of_vectors_gives_is_what_it_gave(golden):
+    figures = {}
+    for n in (3, 9):  # not full, and overwritten
+        buffer = numbered(5, n)
+        batch = buffer.sample(np.random.default_rng(n), 12)
+        figures |= {f"{k} of {n}": v for k, v in batch.items()}
+        state = buffer.state_dict()
+        figures[f"state of {n}"] = f"{[*state]} {[(k, len(v)) for k, v in state['data'].items()]}"
+    golden(figures)
+
+
+def test_a_policys_file_and_its_acts_are_what_they_were(golden, tmp_path):
+    sac, obs = trained()
+    module.save(tmp_path / "policy.safetensors", sac)
+    saved = load_state(tmp_path / "policy.safetensors")
+    policy = module.load(tmp_path / "policy.safetensors")
+    torch.manual_seed(2)
+    golden({
+        "file": [*saved, str(saved["sizes"]), *map(str, saved["actor"]), *saved["normalise"]],
+        "drawn": policy.act(3 * obs), "mean": policy.act(3 * obs, deterministic=True),
+    })  # fmt: skip

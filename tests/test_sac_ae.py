@@ -1,5 +1,6 @@
 """SAC+AE against its publication: which loss trains what, at what pace, from which frames."""
 
+import dataclasses
 import time
 from copy import deepcopy
 
@@ -8,15 +9,16 @@ import numpy as np
 import pytest
 import torch
 from gymnasium.wrappers import FrameStackObservation, TimeLimit
+from moves import Kept, blocks, columns, facts, layers, look, moved, noise, slopes, weights
 
 import tasks
-from lbw_minimal import sac_ae
+from lbw_minimal import sac_ae, sac_ae_networks
 from lbw_minimal.imitate import Run
 from lbw_minimal.replay import FrameBuffer
 from lbw_minimal.sac_ae import SACAE, SIZES, train
 from lbw_minimal.sac_ae_networks import Decoder, Encoder, Patches
 from lbw_minimal.sac_networks import draw
-from lbw_minimal.training import Checkpoint, InputError, save_state
+from lbw_minimal.training import Checkpoint, InputError, load_state, save_state
 
 SHAPE = (84, 84, 3)
 
@@ -249,6 +251,13 @@ def test_target_encoder_critics_and_averaged_actor_each_follow_at_their_pace():
     for pace, (slow, fast) in parts.items():
         for before, p, q in zip(old[pace], slow.parameters(), fast.parameters(), strict=True):
             assert torch.allclose(p, before + pace * (q - before), atol=1e-5)
+
+
+def test_what_follows_slowly_keeps_no_graph_of_the_updates():
+    agent = small()
+    agent.update(batch_of())
+    for network in (agent.target, agent.test_actor):
+        assert not any(p.requires_grad for p in network.parameters())
 
 
 def test_the_target_reads_latents_of_the_targets_encoder():
@@ -547,6 +556,114 @@ def test_other_files_frames_and_sizes_are_refused(tmp_path):
         train(Dot(), steps=10, seed=0)
     with pytest.raises(InputError, match="size 'large': choose one of slim, published"):
         train(dot(), steps=10, seed=0, size="large")
+
+
+# Golden figures -----------------------------------------------------------------------------------
+
+
+def mixed(n=3):
+    """Transitions of which one ends, with stacks of three frames that differ."""
+    obs, next_obs = (
+        torch.from_numpy(blocks(3 * n, seed, low, high).reshape(n, 3, *SHAPE))
+        for seed, low, high in ((1, 0, 200), (2, 60, 256))
+    )
+    batch = {"obs": obs, "next_obs": next_obs, "action": noise(n, 2, seed=3).tanh()}
+    return batch | {"reward": 3 * noise(n, seed=4), "terminal": (torch.arange(n) == 1).float()}
+
+
+def test_the_constants_of_sac_ae_are_those_of_the_shipped_results(golden):
+    golden(facts(sac_ae) | facts(sac_ae_networks))
+
+
+@pytest.mark.parametrize("size", ["slim", "published"])
+def test_sac_aes_networks_begin_and_compute_as_they_did(size, golden):
+    agent = small(size=size)
+    figures = {n: layers(getattr(agent, n)) for n in ("actor", "critic", "decoder")}
+    x = agent.normalise(mixed(1)["obs"])
+    h = agent.encoder(x)
+    figures |= {"x": look(x), "h": look(h), "drawn": look(agent.decoder(h))}
+    figures["shrunk"] = look(agent.normalise.shrunk(x, agent.size.shrink))
+    mean, log_std = agent.actor(x)
+    figures |= {"mean": mean, "log std": log_std, "Q": agent.critic(x, torch.tensor([[0.3, -0.8]]))}
+    parts = (agent.encoder, agent.decoder)
+    golden(figures | {"begin": [p.std().item() for part in parts for p in part.parameters()]})
+
+
+@pytest.mark.parametrize("updates", [0, 1])
+def test_an_update_of_sac_ae_has_the_losses_and_gradients_it_had(updates, golden):
+    """The first is of the critics alone, the second of all."""
+    agent = small(alpha=0.7, gamma=0.8, tau=0.3, tau_encoder=0.2, average=0.1)
+    for p in (*agent.target.parameters(), *agent.test_actor.parameters()):
+        p.mul_(1.2)  # not where the fast ones are
+    agent.updates = updates
+    torch.manual_seed(1)
+    figures = {"y": agent.critic_target(mixed())} | agent.update(mixed())
+    for name in ("critic", "actor", "decoder", "target", "test_actor"):
+        figures[name] = slopes(getattr(agent, name))
+    slow = {"encoder": agent.target.encoder.out[0], "average": agent.test_actor.net[0]}
+    figures |= {f"{name} after": look(layer.weight) for name, layer in slow.items()}
+    golden(figures | {"critic after": look(agent.target.weights[0])})
+
+
+def test_four_updates_of_sac_ae_move_its_networks_as_far_as_they_did(golden):
+    agent = small(critic_lr=3e-3, actor_lr=2e-3, alpha=0.5)
+    names = ("actor", "critic", "target", "test_actor", "decoder", "encoder")
+    before, told = {name: weights(getattr(agent, name)) for name in names}, []
+    for seed in range(4):
+        torch.manual_seed(seed)
+        told.append(agent.update(mixed()))
+    figures = {name: moved(before[name], getattr(agent, name)) for name in names}
+    kept = agent.state_dict()
+    figures |= {"state": [*kept], "updates": kept["updates"], "log alpha": kept["log_alpha"]}
+    for adam in ("optimizer", "autoencoder"):
+        groups = kept[adam]["param_groups"]
+        for k in ("lr", "betas", "eps"):
+            figures[f"{adam}'s {k}"] = [g[k] for g in groups]
+        figures[f"{adam}'s decay"] = str([g["weight_decay"] for g in groups])
+    golden(figures | columns(told))
+
+
+def test_a_short_training_of_sac_ae_goes_as_it_went(golden, monkeypatch):
+    """Its random actions are held, its frames kept; batches of five, one trial at the end."""
+    small_size = dataclasses.replace(SIZES["slim"], batch=5)
+    monkeypatch.setitem(sac_ae.SIZES, "slim", small_size)
+    monkeypatch.setattr("lbw_minimal.sac.TRIALS", 1)
+    kept, made = Kept(), []
+    buffer = FrameBuffer
+    monkeypatch.setattr(
+        sac_ae, "FrameBuffer", lambda *of: made.append((of, buffer(*of))) or made[-1][1]
+    )
+    agent, log = train(dot(), steps=26, seed=6, random_steps=22, hold=3, checkpoint=kept)
+    ((of, frames),) = made
+    figures = {f"kept: {k}": v[: len(frames)] for k, v in frames.data.items()}
+    figures |= {"asked": str(of), "frames": [f.mean() for f in frames.frames[: frames.kept]]}
+    figures |= {"state": [*kept.states[0]], "forced": kept.forced}
+    figures["acts"] = agent.act(frames_of(1)[0], deterministic=True)
+    golden(figures | columns(log))
+
+
+def test_what_a_buffer_of_frames_gives_is_what_it_gave(golden):
+    buffer, _ = filled()
+    batch = buffer.sample(np.random.default_rng(1), 20)
+    figures = {k: batch[k] for k in ("action", "reward", "terminal")}
+    figures |= {k: batch[k][..., 0, 0, 0] for k in ("obs", "next_obs")}
+    state = buffer.state_dict()
+    figures |= {"state": [*state], "rows": state["data"]["row"], "starts": state["data"]["start"]}
+    golden(
+        figures | {"frames": state["frames"][:, 0, 0, 0], "added": [state["added"], buffer.kept]}
+    )
+
+
+def test_a_pixel_policys_file_and_its_acts_are_what_they_were(golden, tmp_path):
+    agent, obs = small(), frames_of(1)[0]
+    sac_ae.save(tmp_path / "policy.safetensors", agent)
+    saved = load_state(tmp_path / "policy.safetensors")
+    policy = sac_ae.load(tmp_path / "policy.safetensors")
+    torch.manual_seed(2)
+    golden({
+        "file": [*saved, str(saved["sizes"]), *map(str, saved["actor"])],
+        "drawn": policy.act(obs), "mean": policy.act(obs, deterministic=True),
+    })  # fmt: skip
 
 
 class Distance(gym.Wrapper):

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 import torch
+from moves import Kept, blocks, columns, facts, layers, look, moved, noise, slopes, weights
 
 from lbw_minimal import transporter as tp
+from lbw_minimal.images import to_images
 from lbw_minimal.training import Checkpoint, InputError
 
 TRAINING = 60  # iterations of the one training that several claims share, a second for ten
@@ -396,3 +398,93 @@ def test_no_frames_have_no_keypoints():
 def test_a_video_of_one_frame_is_refused_for_nothing_moves_in_it():
     with pytest.raises(InputError, match=r"video 1 is .* two or more frames"):
         tp.train([np.zeros((n, 84, 84, 3), np.uint8) for n in (2, 1)], iterations=1, seed=0, K=2)
+
+
+# Golden figures -----------------------------------------------------------------------------------
+
+
+def test_the_constants_of_the_transporter_are_those_of_the_shipped_results(golden):
+    golden(facts(tp))
+
+
+def test_transporters_parts_compute_what_they_computed(golden):
+    """Maps that are wider than high, keypoints that meet and that stand beyond the edge."""
+    logits, images = noise(2, 3, 5, 8, seed=0), noise(2, 3, 84, 84, seed=2)
+    z = 0.6 * noise(2, 3, 2, seed=1)
+    z[0, 1] = z[0, 0] + 0.02
+    phi_x, phi_y, h_x, h_y = (noise(2, 4, 6, 9, seed=3 + i) for i in range(4))
+    golden({
+        "keypoints": tp.soft_argmax(logits),
+        "map": look(tp.heat_map(z), 30),
+        "wide map": look(tp.heat_map(z, 0.3, 9), 30),
+        "transported": look(tp.transport(phi_x, phi_y, h_x[:, :1], h_y[:, :1])),
+        "loss": [tp.loss(phi_x, phi_y).item(), tp.loss(phi_x, phi_y, h_x[:, :1].abs()).item()],
+        "crowding": [tp.crowding(z, sigma).item() for sigma in (0.1, 0.3, 2.0)],
+        "identity": tp.identity(z, images).item(),
+    })  # fmt: skip
+
+
+def test_pairs_are_drawn_as_they_were(golden):
+    """Exactly: of videos shorter and longer than the widest gap."""
+    drawn = [
+        tp._draw_pairs(np.array([6, 90, 45]), 120, np.random.default_rng(seed)) for seed in (0, 1)
+    ]
+    golden({f"{seed}": np.concatenate(pair) for seed, pair in enumerate(drawn)}, rtol=0)
+
+
+def test_transporters_networks_begin_and_compute_as_they_did(golden):
+    torch.manual_seed(0)
+    model, (x, y, seen) = tp.Transporter(3), (to_images(blocks(2, i)) for i in (1, 2, 3))
+    figures = {"layers": layers(tp.Transporter())}
+    figures["begin"] = [p.std().item() for p in model.parameters() if p.ndim > 1]
+    asked = {
+        "plain": {},
+        "all": {"y_seen": seen, "sigma": 0.25, "moved": torch.tensor([0.1, -0.3])},
+    }
+    for name, more in asked.items():
+        y_hat, z = model(x, y, **more)
+        figures |= {f"{name} y": look(y_hat), f"{name} z": z}
+    golden(figures | {"z": model.eval().keypoints(y)})
+
+
+@pytest.mark.parametrize("early, scale", [(1.0, 1.0), (0.4, 0.02), (0.0, 1.0)])
+def test_a_first_update_of_the_transporter_has_the_gradients_it_had(early, scale, golden):
+    """Those of small errors are shorter than the clip, the others are cut off by it."""
+    torch.manual_seed(1)
+    model, (x, y) = tp.Transporter(3), (scale * to_images(blocks(3, i)) for i in (1, 2))
+    with torch.no_grad():
+        for p in model.refiner.parameters():
+            p.mul_(scale)
+    median, optimizer = scale * to_images(blocks(1, 3)), torch.optim.SGD(model.parameters(), 0.01)
+    told = tp._update(model, optimizer, x, y, median, early, 3, 120)
+    golden({"gradients": slopes(model), **told})
+
+
+def test_four_steps_of_transporters_training_go_where_they_went(golden, monkeypatch):
+    """With shifts and hues, of three videos; what four steps in a row moved tells the rate."""
+    monkeypatch.setattr(tp, "LOG_EVERY", 2)
+    monkeypatch.setattr(tp, "BATCH", 8)
+    kept, videos = Kept(), [blocks(6, 1), blocks(30, 2, 0, 200), blocks(41, 3, 60, 256)]
+    model, log = tp.train(videos, iterations=5, seed=3, K=3, shift=4, hue=60, checkpoint=kept)
+    torch.manual_seed(3)
+    figures = {"moved": moved(weights(tp.Transporter(3)), model), "forced": kept.forced}
+    figures["from the corner"] = tp.detect(model, videos[1][:2]) + 1
+    groups = [state["optimizer"]["param_groups"][0] for state in kept.states]
+    figures |= {f"adam's {k}": [g[k] for g in groups] for k in ("lr", "eps", "weight_decay")}
+    figures |= {"state": [*kept.states[0]], "spread": [row.pop("keypoint_std") for row in log]}
+    golden(figures | columns(log))
+
+
+def test_a_fit_to_keypoints_is_as_good_as_it_was(golden):
+    rng = np.random.default_rng(0)
+    z = rng.normal(size=(41, 2, 2))
+    true = 20 + 9 * z.reshape(41, 4)[:, [0, 3, 1]] + rng.normal(size=(41, 3)) * [1, 4, 9]
+    held = z[::3] + 0.2, true[::3]
+    figures = {"r2": [tp.r2(z, true), tp.r2(z, true, *held)]}
+    golden(figures | {"pixels": [tp.pixel_error(z, true), tp.pixel_error(z, true, *held)]})
+
+
+def test_more_frames_than_a_batch_are_detected_as_they_were(golden):
+    torch.manual_seed(0)
+    z = tp.detect(tp.Transporter(2).eval(), blocks(131, 4))
+    golden({"shape": z.shape, "z": z[[0, 63, 64, 127, 128, 130]]})
