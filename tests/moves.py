@@ -2,13 +2,14 @@
 move with whatever a network, a training or a recipe does differently."""
 
 import inspect
+import re
 from copy import deepcopy
 from types import ModuleType
 
 import numpy as np
 import torch
 
-from lbw_minimal.training import Checkpoint
+from lbw_minimal.training import Checkpoint, load_state
 
 
 def blocks(n, seed, low=0, high=256):
@@ -66,15 +67,72 @@ def columns(log):
 
 
 class Kept(Checkpoint):
-    """Keeps the states of a training in memory, one a call, and how each was asked for."""
+    """Keeps the states of a training in memory, one a call, and how each was asked for.
 
-    def __init__(self):
+    begun: a state to begin with, for a training that goes on.
+    """
+
+    def __init__(self, begun=None):
         super().__init__(None)
-        self.states, self.forced = [], []
+        self.begun, self.states, self.forced = begun, [], []
+
+    def load(self):
+        return self.begun
 
     def save(self, make_state, force=False):
         self.states.append(deepcopy(make_state()))
         self.forced.append(force)
+
+
+class Bar:
+    """What a training's bar is told, in words without their figures, which may round otherwise."""
+
+    def __init__(self, monkeypatch, module):
+        self.told, self.n = [], 0
+        monkeypatch.setattr(module, "progress", self.begin)
+
+    def begin(self, total, name, start=0):
+        self.told.append(f"{name} {start} of {total}")
+        self.n = start
+        return self
+
+    def update(self, n=1):
+        self.n += n
+        self.told.append(str(self.n))
+
+    def set_postfix_str(self, text, refresh=True):
+        self.told.append(re.sub(r"\d", "0", text).replace("-", ""))
+
+    def close(self):
+        self.told.append("closed")
+
+
+def in_file(path):
+    """What a file of weights holds, in words: its settings, and how many numbers of which kind."""
+
+    def words(name, value):
+        if isinstance(value, dict) and any(torch.is_tensor(v) for v in value.values()):
+            kinds = sorted({str(v.dtype) for v in value.values()})
+            return f"{name}: {len(value)} tensors of {' '.join(kinds)}"
+        if torch.is_tensor(value):
+            return f"{name}: {tuple(value.shape)} {value.dtype}"
+        return f"{name}: {value}"
+
+    return [words(name, value) for name, value in load_state(path).items()]
+
+
+def refusals(folder, *calls):
+    """What those who call so are told, whatever folder it was tried in."""
+    told = []
+    for call in calls:
+        try:
+            call()
+        except Exception as error:
+            text = f"{type(error).__name__}: {error}".replace(f"{folder}", "folder")
+            told.append(text.replace("\\", "/"))
+        else:
+            told.append("nothing")
+    return told
 
 
 def facts(module):

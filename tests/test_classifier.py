@@ -5,12 +5,25 @@ from inspect import signature
 import numpy as np
 import pytest
 import torch
-from moves import Kept, blocks, columns, facts, layers, look, moved, slopes, weights
+from moves import (
+    Bar,
+    Kept,
+    blocks,
+    columns,
+    facts,
+    in_file,
+    layers,
+    look,
+    moved,
+    refusals,
+    slopes,
+    weights,
+)
 
 import tasks
 from lbw_minimal import classifier, transporter, video
 from lbw_minimal.classifier import ClassifierReward, GoalClassifier, goal_frames
-from lbw_minimal.training import Checkpoint, InputError, load_state
+from lbw_minimal.training import Checkpoint, InputError, load_state, save_state
 
 ITERATIONS = 200  # of the one training that several claims share
 
@@ -282,6 +295,8 @@ def test_the_constants_of_the_classifier_are_those_of_the_shipped_results(golden
 def test_the_classifier_begins_and_computes_as_it_did(golden):
     torch.manual_seed(0)
     model, images = GoalClassifier(), classifier.small_images(blocks(3, 1))
+    beside = dict(memory_format=torch.channels_last)  # in memory: so the layers are faster
+    assert images.is_contiguous(**beside) and model.layers[2].weight.is_contiguous(**beside)
     figures = {"layers": layers(model), "logits": model(images), "seen": look(images)}
     figures["begin"] = [p.abs().mean().item() for p in model.parameters()]
     paid = ClassifierReward(model, 0.02)
@@ -303,12 +318,35 @@ def test_a_first_update_of_the_classifier_has_the_gradients_it_had(golden):
 
 def test_three_steps_of_the_classifiers_training_go_where_they_went(golden, monkeypatch):
     monkeypatch.setattr(classifier, "LOG_EVERY", 2)
-    kept = Kept()
+    kept, bar = Kept(), Bar(monkeypatch, classifier)
     model, log = classifier.train(
         blocks(4, 1), blocks(9, 2), iterations=3, seed=5, checkpoint=kept
     )  # fmt: skip
+    done = Kept(kept.states[-1])
+    classifier.train(blocks(4, 1), blocks(9, 2), iterations=3, seed=5, checkpoint=done)
     torch.manual_seed(5)
-    figures = {"moved": moved(weights(GoalClassifier()), model), "forced": kept.forced}
+    figures = {
+        "bar": bar.told,
+        "moved": moved(weights(GoalClassifier()), model),
+        "forced": kept.forced,
+    }
     for k in ("lr", "betas", "eps", "weight_decay"):
         figures[f"adam's {k}"] = kept.states[-1]["optimizer"]["param_groups"][0][k]
     golden(figures | columns(log) | {"state": [*kept.states[0]]})
+
+
+def test_the_classifiers_file_and_refusals_say_what_they_said(golden, tmp_path):
+    path, other = tmp_path / "classifier.safetensors", tmp_path / "other.safetensors"
+    classifier.save(path, GoalClassifier(7), "push")
+    save_state(other, {"kind": "munit", "task": "push"})
+    calls = [(path, "reach"), (other, "push"), (tmp_path / "none", "push")]
+    told = refusals(tmp_path, *(lambda c=c: classifier.load(*c) for c in calls))
+    wrong = [], [numbered(9), numbered(9)[:, :64]], [numbered(9) / 1.0], [numbered(2), numbered(1)]
+    told += refusals(tmp_path, *(lambda v=v: goal_frames(v) for v in wrong))
+    few = (grey(0, 0), grey(0)), (grey(0), grey(0, 0)), (grey(0)[0], grey(0))
+    asked = dict(iterations=0, seed=0)
+    told += refusals(tmp_path, *(lambda v=v: classifier.train(*v, **asked) for v in few))
+    alone = dict(iterations=0, seed=0, device="tv")
+    told += refusals(tmp_path, lambda: classifier.train(grey(0), grey(0), **alone))
+    least = [len(part) for part in goal_frames([numbered(2)])]
+    golden({"file": in_file(path), "refusals": told, "least": least})

@@ -5,7 +5,20 @@ from contextlib import nullcontext
 import numpy as np
 import pytest
 import torch
-from moves import Kept, blocks, columns, facts, layers, look, moved, slopes, weights
+from moves import (
+    Bar,
+    Kept,
+    blocks,
+    columns,
+    facts,
+    in_file,
+    layers,
+    look,
+    moved,
+    refusals,
+    slopes,
+    weights,
+)
 from torch import nn
 from toy_videos import DiesAfter, Killed, squares
 
@@ -375,11 +388,12 @@ def test_a_first_update_of_cyclegan_has_the_losses_and_gradients_it_had(
 def test_three_steps_of_cyclegans_training_go_where_they_went(exact, golden, monkeypatch):
     monkeypatch.setattr(cyclegan, "LOG_EVERY", 1)
     monkeypatch.setattr(cyclegan, "POOL", 4)
-    kept = Kept()
+    kept, bar = Kept(), Bar(monkeypatch, cyclegan)
     human, robot = blocks(5, 5, 0, 200), blocks(4, 6, 60, 256)
-    small = dict(iterations=3, seed=2, width=2, batch=3)
-    model, log = cyclegan.train(human, robot, **small, motion=True, checkpoint=kept)
-    figures = columns(log) | {"state": [*kept.states[0]], "forced": kept.forced}
+    small = dict(iterations=3, seed=2, width=2, batch=3, motion=True)
+    model, log = cyclegan.train(human, robot, **small, checkpoint=kept)
+    cyclegan.train(human, robot, **small, checkpoint=Kept(kept.states[-1]))  # it is done already
+    figures = {"bar": bar.told} | columns(log) | {"state": [*kept.states[0]], "forced": kept.forced}
     torch.manual_seed(2)
     networks = {"model": CycleGAN(2), "critics": nn.ModuleDict({d: Critic() for d in "xy"})}
     for name, network in networks.items():
@@ -394,6 +408,20 @@ def test_three_steps_of_cyclegans_training_go_where_they_went(exact, golden, mon
         figures[pool] = [v.mean().item() for v in kept.states[2][pool]["images"]]
         figures[f"{pool}'s dice"] = str(kept.states[2][pool]["rng"]["state"])
     golden(figures)
+
+
+def test_cyclegans_file_and_refusals_say_what_they_said(golden, tmp_path):
+    path, other = tmp_path / "cyclegan.safetensors", tmp_path / "other.safetensors"
+    cyclegan.save(path, CycleGAN(2, 1), "push")
+    save_state(other, {"kind": "munit", "task": "push"})
+    calls = [(path, "reach"), (other, "push"), (tmp_path / "none", "push")]
+    calls = [*(lambda c=c: cyclegan.load(*c) for c in calls)]
+    calls.append(lambda: cyclegan.train(*squares(), iterations=0, seed=0, device="tv"))
+    golden({
+        "file": in_file(path),
+        "refusals": refusals(tmp_path, *calls),
+        "eval": not cyclegan.load(path, "push").training,
+    })  # fmt: skip
 
 
 def test_cyclegans_translations_look_as_they_looked(golden):

@@ -6,7 +6,20 @@ from copy import deepcopy
 import numpy as np
 import pytest
 import torch
-from moves import Kept, blocks, columns, facts, layers, look, moved, slopes, weights
+from moves import (
+    Bar,
+    Kept,
+    blocks,
+    columns,
+    facts,
+    in_file,
+    layers,
+    look,
+    moved,
+    refusals,
+    slopes,
+    weights,
+)
 from torch import nn
 from toy_videos import DiesAfter, Killed, squares
 
@@ -434,12 +447,12 @@ def test_a_first_update_of_munit_has_the_losses_and_gradients_it_had(weighted, e
 def test_three_steps_of_munits_training_go_where_they_went(exact, golden, monkeypatch):
     """Losses, how far off the mean images are, and how far all weights have moved in each step."""
     monkeypatch.setattr(munit, "LOG_EVERY", 1)
-    kept = Kept()
-    model, log = munit.train(
-        blocks(5, 5, 0, 200), blocks(4, 6, 60, 256), iterations=3, seed=2, width=2, batch=3,
-        checkpoint=kept,
-    )  # fmt: skip
-    figures = columns(log) | {"state": [*kept.states[0]], "forced": kept.forced}
+    kept, bar = Kept(), Bar(monkeypatch, munit)
+    films = blocks(5, 5, 0, 200), blocks(4, 6, 60, 256)
+    small = dict(iterations=3, seed=2, width=2, batch=3)
+    model, log = munit.train(*films, **small, checkpoint=kept)
+    munit.train(*films, **small, checkpoint=Kept(kept.states[-1]))  # it is done already
+    figures = {"bar": bar.told} | columns(log) | {"state": [*kept.states[0]], "forced": kept.forced}
     torch.manual_seed(2)
     networks = {"model": MUNIT(2), "critics": nn.ModuleDict({d: munit.Critic() for d in "xy"})}
     networks["average"] = deepcopy(networks["model"])
@@ -453,6 +466,20 @@ def test_three_steps_of_munits_training_go_where_they_went(exact, golden, monkey
     golden(figures | {"returned": moved(weights(model), networks["average"])})
 
 
+def test_munits_file_and_refusals_say_what_they_said(golden, tmp_path):
+    path, other = tmp_path / "munit.safetensors", tmp_path / "other.safetensors"
+    munit.save(path, MUNIT(2), torch.ones(8), "push")
+    save_state(other, {"kind": "transporter", "task": "push"})
+    calls = [(path, "reach"), (other, "push"), (tmp_path / "none", "push")]
+    calls = [*(lambda c=c: munit.load(*c) for c in calls)]
+    calls.append(lambda: munit.train(*squares(), iterations=0, seed=0, device="tv"))
+    golden({
+        "file": in_file(path),
+        "refusals": refusals(tmp_path, *calls),
+        "eval": not munit.load(path, "push")[0].training,
+    })  # fmt: skip
+
+
 def test_munits_translations_look_as_they_looked(golden):
     """More frames than any one batch, or any mean, takes."""
     torch.manual_seed(0)
@@ -463,6 +490,7 @@ def test_munits_translations_look_as_they_looked(golden):
     style = munit.robot_style(model, robot)
     figures = {
         "style": style,
+        "learns": style.requires_grad,
         "translated": look(munit.translate(model, human, 5 * style) / 1.0, 1),
     }
     mean = munit.mean_images(model, human, robot)

@@ -103,6 +103,26 @@ def test_an_episode_lasts_as_long_as_the_longest_video_asks_and_the_task_allows(
     assert count == steps and set(info["reward_parts"]) == {"logit"}
 
 
+class Endless(gym.Env):
+    """A black frame for ever; nothing says how long an episode may be."""
+
+    observation_space = gym.spaces.Box(0, 255, (84, 84, 3), np.uint8)
+    action_space = gym.spaces.Box(-1, 1, (2,), np.float32)
+
+    def reset(self, seed=None, options=None):
+        return np.zeros((84, 84, 3), np.uint8), {}
+
+    def step(self, action):
+        return np.zeros((84, 84, 3), np.uint8), 0.0, False, False, {}
+
+
+def test_an_episode_lasts_by_the_video_alone_where_the_task_sets_no_end():
+    """A fourth more than the longest video's 43 frames, in whole steps: 53.75 are 54."""
+    env = rivals.watched(Endless(), classifier.GoalClassifier(43))
+    env.reset()
+    assert [env.step(np.zeros(2))[3] for _ in range(54)] == [*53 * [False], True]
+
+
 def test_the_clip_of_the_recipe_bounds_the_reward():
     model = classifier.GoalClassifier(20)
     model.layers[-1].bias.data.fill_(7.0)

@@ -6,7 +6,20 @@ import gymnasium as gym
 import numpy as np
 import pytest
 import torch
-from moves import Kept, columns, facts, layers, look, moved, noise, slopes, weights
+from moves import (
+    Bar,
+    Kept,
+    columns,
+    facts,
+    in_file,
+    layers,
+    look,
+    moved,
+    noise,
+    refusals,
+    slopes,
+    weights,
+)
 
 from lbw_minimal import replay, sac_networks
 from lbw_minimal import sac as module
@@ -430,7 +443,7 @@ def test_a_full_buffer_comes_back_and_forgets_the_oldest_next(tmp_path):
         assert sorted(one.data["reward"]) == [3, 4, 5]
 
 
-def test_a_resumed_run_ends_as_the_uninterrupted_one(tmp_path):
+def test_a_resumed_run_ends_as_the_uninterrupted_one(tmp_path, monkeypatch):
     recipe = dict(steps=200, seed=3, random_steps=40, width=16, batch=16)
     whole, log = train(Walk(), **recipe)
 
@@ -444,8 +457,9 @@ def test_a_resumed_run_ends_as_the_uninterrupted_one(tmp_path):
     path = tmp_path / "policy.checkpoint"
     with pytest.raises(Stop):
         train(Cut(), checkpoint=Checkpoint(path, seconds=0), **recipe)
+    bar = Bar(monkeypatch, module)
     resumed, log_2 = train(Walk(), checkpoint=Checkpoint(path), **recipe)
-    assert log_2 == log
+    assert log_2 == log and bar.told[0] == "policy 120 of 200"
     for p, q in zip(whole.actor.parameters(), resumed.actor.parameters(), strict=True):
         assert torch.equal(p, q)
 
@@ -769,7 +783,7 @@ class Room(gym.Env):
 def test_a_short_training_of_sac_goes_as_it_went(golden, monkeypatch, buffers):
     """Random steps, updates, an evaluation, candidates, and the trials that choose one of them."""
     monkeypatch.setattr(module, "WINDOW", 2)
-    env, kept, chosen = Room(), Kept(), []
+    env, kept, chosen, bar = Room(), Kept(), [], Bar(monkeypatch, module)
     best = module.best_actor
     monkeypatch.setattr(
         module, "best_actor", lambda *of: chosen.append(of[2]) or best(*of)
@@ -779,7 +793,9 @@ def test_a_short_training_of_sac_goes_as_it_went(golden, monkeypatch, buffers):
         evaluate=lambda agent: {"tried": agent.alpha}, evaluate_every=3,
     )  # fmt: skip
     n = len(buffers[0])
-    figures = {f"kept: {k}": look(v[:n], 20) for k, v in buffers[0].data.items()}
+    figures = {"bar": bar.told} | {
+        f"kept: {k}": look(v[:n], 20) for k, v in buffers[0].data.items()
+    }
     figures |= {"seeds": str(env.seeds), "steps": len(env.actions), "state": [*kept.states[0]]}
     figures |= {"forced": kept.forced, "capacity": buffers[0].capacity}
     figures["returns"] = [c["return"] for c in kept.states[-1]["candidates"]]
@@ -816,7 +832,9 @@ def test_a_policys_file_and_its_acts_are_what_they_were(golden, tmp_path):
     saved = load_state(tmp_path / "policy.safetensors")
     policy = module.load(tmp_path / "policy.safetensors")
     torch.manual_seed(2)
-    golden({
-        "file": [*saved, str(saved["sizes"]), *map(str, saved["actor"]), *saved["normalise"]],
-        "drawn": policy.act(3 * obs), "mean": policy.act(3 * obs, deterministic=True),
-    })  # fmt: skip
+    names = [*map(str, saved["actor"]), *saved["normalise"]]
+    save_state(tmp_path / "other", {"kind": "pixel policy"})
+    told = refusals(tmp_path, lambda: module.load(tmp_path / "other"))
+    figures = {"file": in_file(tmp_path / "policy.safetensors"), "names": names, "refusals": told}
+    figures["drawn"] = policy.act(3 * obs)
+    golden(figures | {"mean": policy.act(3 * obs, deterministic=True)})

@@ -9,7 +9,20 @@ import numpy as np
 import pytest
 import torch
 from gymnasium.wrappers import FrameStackObservation, TimeLimit
-from moves import Kept, blocks, columns, facts, layers, look, moved, noise, slopes, weights
+from moves import (
+    Kept,
+    blocks,
+    columns,
+    facts,
+    in_file,
+    layers,
+    look,
+    moved,
+    noise,
+    refusals,
+    slopes,
+    weights,
+)
 
 import tasks
 from lbw_minimal import sac_ae, sac_ae_networks
@@ -579,7 +592,9 @@ def test_the_constants_of_sac_ae_are_those_of_the_shipped_results(golden):
 def test_sac_aes_networks_begin_and_compute_as_they_did(size, golden):
     agent = small(size=size)
     figures = {n: layers(getattr(agent, n)) for n in ("actor", "critic", "decoder")}
-    x = agent.normalise(mixed(1)["obs"])
+    x = agent.normalise(mixed(2)["obs"])
+    assert x.is_contiguous(memory_format=torch.channels_last)  # so the convolutions are faster
+    x = x[:1]
     h = agent.encoder(x)
     figures |= {"x": look(x), "h": look(h), "drawn": look(agent.decoder(h))}
     figures["shrunk"] = look(agent.normalise.shrunk(x, agent.size.shrink))
@@ -660,10 +675,22 @@ def test_a_pixel_policys_file_and_its_acts_are_what_they_were(golden, tmp_path):
     saved = load_state(tmp_path / "policy.safetensors")
     policy = sac_ae.load(tmp_path / "policy.safetensors")
     torch.manual_seed(2)
-    golden({
-        "file": [*saved, str(saved["sizes"]), *map(str, saved["actor"])],
-        "drawn": policy.act(obs), "mean": policy.act(obs, deterministic=True),
-    })  # fmt: skip
+    path = tmp_path / "policy.frames"
+    buffer, _ = filled(path)
+    save_state(tmp_path / "other", {"kind": "policy"} | buffer.state_dict())
+    path.unlink()
+    lost = FrameBuffer((2, 2, 3), 2, 40, path)
+    told = refusals(
+        tmp_path,
+        lambda: sac_ae.load(tmp_path / "other"),
+        lambda: train(Dot(), steps=1, seed=0),
+        lambda: train(dot(), steps=1, seed=0, size="large"),
+        lambda: train(dot(), steps=1, seed=0, device="tv"),
+        lambda: lost.load_state_dict(load_state(tmp_path / "other")),
+    )
+    figures = {"file": in_file(tmp_path / "policy.safetensors"), "refusals": told}
+    figures |= {"names": [*map(str, saved["actor"])], "drawn": policy.act(obs)}
+    golden(figures | {"mean": policy.act(obs, deterministic=True)})
 
 
 class Distance(gym.Wrapper):

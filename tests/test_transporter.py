@@ -3,11 +3,25 @@
 import numpy as np
 import pytest
 import torch
-from moves import Kept, blocks, columns, facts, layers, look, moved, noise, slopes, weights
+from moves import (
+    Bar,
+    Kept,
+    blocks,
+    columns,
+    facts,
+    in_file,
+    layers,
+    look,
+    moved,
+    noise,
+    refusals,
+    slopes,
+    weights,
+)
 
 from lbw_minimal import transporter as tp
 from lbw_minimal.images import to_images
-from lbw_minimal.training import Checkpoint, InputError
+from lbw_minimal.training import Checkpoint, InputError, save_state
 
 TRAINING = 60  # iterations of the one training that several claims share, a second for ten
 
@@ -464,15 +478,37 @@ def test_four_steps_of_transporters_training_go_where_they_went(golden, monkeypa
     """With shifts and hues, of three videos; what four steps in a row moved tells the rate."""
     monkeypatch.setattr(tp, "LOG_EVERY", 2)
     monkeypatch.setattr(tp, "BATCH", 8)
-    kept, videos = Kept(), [blocks(6, 1), blocks(30, 2, 0, 200), blocks(41, 3, 60, 256)]
-    model, log = tp.train(videos, iterations=5, seed=3, K=3, shift=4, hue=60, checkpoint=kept)
+    kept, bar = Kept(), Bar(monkeypatch, tp)
+    videos = [blocks(6, 1), blocks(30, 2, 0, 200), blocks(41, 3, 60, 256)]
+    small = dict(iterations=5, seed=3, K=3, shift=4, hue=60)
+    model, log = tp.train(videos, **small, checkpoint=kept)
+    tp.train(videos, **small, checkpoint=Kept(kept.states[-1]))  # it is done already
     torch.manual_seed(3)
     figures = {"moved": moved(weights(tp.Transporter(3)), model), "forced": kept.forced}
     figures["from the corner"] = tp.detect(model, videos[1][:2]) + 1
     groups = [state["optimizer"]["param_groups"][0] for state in kept.states]
     figures |= {f"adam's {k}": [g[k] for g in groups] for k in ("lr", "eps", "weight_decay")}
-    figures |= {"state": [*kept.states[0]], "spread": [row.pop("keypoint_std") for row in log]}
+    figures |= {
+        "bar": bar.told,
+        "state": [*kept.states[0]],
+        "spread": [row.pop("keypoint_std") for row in log],
+    }
     golden(figures | columns(log))
+
+
+def test_transporters_file_and_refusals_say_what_they_said(golden, tmp_path):
+    path, other = tmp_path / "keypoints.safetensors", tmp_path / "other.safetensors"
+    tp.save(path, tp.Transporter(3), "push")
+    save_state(other, {"kind": "munit", "task": "push"})
+    calls = [(path, "reach"), (other, "push"), (tmp_path / "none", "push")]
+    shapes = (5, 84, 84), (5, 84, 80, 3), (5, 84, 84, 4), (1, 84, 84, 3)
+    films = [np.zeros(shape, np.uint8) for shape in shapes] + [np.zeros((5, 84, 84, 3))]
+    told = refusals(tmp_path, *(lambda c=c: tp.load(*c) for c in calls))
+    asked = dict(iterations=0, seed=0)
+    told += refusals(tmp_path, *(lambda v=v: tp.train([blocks(2, 0), v], **asked) for v in films))
+    told += refusals(tmp_path, lambda: tp.train([blocks(2, 0)], **asked, device="tv"))
+    figures = {"file": in_file(path), "refusals": told, "any task": tp.load(path).K}
+    golden(figures | {"eval": not tp.load(path, "push").training})
 
 
 def test_a_fit_to_keypoints_is_as_good_as_it_was(golden):
