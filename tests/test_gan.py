@@ -206,6 +206,8 @@ def test_what_translations_share_computes_what_it_computed(golden):
     scores = [noise(2, 1, 10, 10, seed=2), noise(2, 1, 5, 5, seed=3)]
     figures = {"l1": [gan.l1(a, b).item(), gan.l1(a, b, weight).item()]}
     figures["squares"] = [gan.least_squares(scores, t, weight).item() for t in (0.0, 1.0)]
+    of_halves = gan.l1(a.bfloat16(), b.bfloat16())
+    figures |= {"of bfloat16": of_halves.item(), "in": str(of_halves.dtype)}
     D = lambda v: [s + v.mean() for s in scores]  # noqa: E731
     figures["critic"] = gan.critic_loss(D, a + 1, b - 2, weight, weight.flip(3)).item()
     frames = blocks(7, 4)

@@ -25,7 +25,7 @@ from lbw_minimal import replay, sac_networks
 from lbw_minimal import sac as module
 from lbw_minimal.replay import ReplayBuffer
 from lbw_minimal.sac import SAC, best_actor, train
-from lbw_minimal.sac_networks import Actor, Normaliser, TwinCritic
+from lbw_minimal.sac_networks import Actor, Normaliser, TwinCritic, draw
 from lbw_minimal.training import Checkpoint, InputError, load_state, save_state
 
 
@@ -702,6 +702,8 @@ def test_sacs_networks_begin_and_compute_as_they_did(golden):
     figures |= {"mean": mean, "log std": log_std, "Q": critic(s, a)}
     torch.manual_seed(1)
     figures |= dict(zip(("drawn", "density"), actor.sample(s), strict=True))
+    at_the_ends = torch.tensor([[9.0, -9.0], [0.5, 20.0]])  # where tanh rounds to 1
+    figures["density at the ends"] = draw(at_the_ends, torch.zeros(2, 2))[1]
     for x in noise(4, 3, seed=3) * torch.tensor([1.0, 0.004, 30.0]):
         normalise.observe(x.numpy())
     figures |= {name: v for name, v in normalise.state_dict().items()}

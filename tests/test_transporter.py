@@ -393,6 +393,8 @@ def test_a_cell_of_the_map_is_centred_on_its_four_pixels():
 
 def test_the_background_is_the_median_of_the_whole_of_a_long_video(monkeypatch):
     """Every third of 500 frames; they begin in the dark and are bright in the end."""
+    asked, median_frame = [], tp.median_frame
+    monkeypatch.setattr(tp, "median_frame", lambda v: asked.append(len(v)) or median_frame(v))
     video, seen = np.zeros((500, 84, 84, 3), np.uint8), []
     video[240:] = 255
 
@@ -402,7 +404,7 @@ def test_the_background_is_the_median_of_the_whole_of_a_long_video(monkeypatch):
 
     monkeypatch.setattr(tp, "_update", update)
     tp.train([video], iterations=1, seed=0, K=2, shift=1, hue=2)
-    assert (seen[0] == 1).all()
+    assert (seen[0] == 1).all() and asked == [167]
 
 
 def test_no_frames_have_no_keypoints():
