@@ -418,6 +418,14 @@ def test_the_buffer_comes_back_and_its_frames_stay_in_their_file(tmp_path, in_fi
     assert all(torch.equal(one[k], two[k]) for k in one) and again.kept == 11
 
 
+def test_frames_are_written_out_before_a_checkpoint_counts_on_them(tmp_path, monkeypatch):
+    buffer, _ = filled(tmp_path / "policy.frames")
+    flushed = []
+    monkeypatch.setattr(np.memmap, "flush", lambda frames: flushed.append(frames))
+    buffer.state_dict()
+    assert len(flushed) == 1 and flushed[0] is buffer.frames
+
+
 def test_lost_frames_are_noticed(tmp_path):
     buffer, _ = filled(tmp_path / "policy.frames")
     save_state(tmp_path / "state", buffer.state_dict())
