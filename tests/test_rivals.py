@@ -104,16 +104,18 @@ def test_an_episode_lasts_as_long_as_the_longest_video_asks_and_the_task_allows(
 
 
 class Endless(gym.Env):
-    """A black frame for ever; nothing says how long an episode may be."""
+    """A brighter frame at each step; nothing says how long an episode may be."""
 
     observation_space = gym.spaces.Box(0, 255, (84, 84, 3), np.uint8)
     action_space = gym.spaces.Box(-1, 1, (2,), np.float32)
 
     def reset(self, seed=None, options=None):
-        return np.zeros((84, 84, 3), np.uint8), {}
+        self.level = 7
+        return np.full((84, 84, 3), 7, np.uint8), {}
 
     def step(self, action):
-        return np.zeros((84, 84, 3), np.uint8), 0.0, False, False, {}
+        self.level += 1
+        return np.full((84, 84, 3), self.level, np.uint8), 0.0, False, False, {}
 
 
 def test_an_episode_lasts_by_the_video_alone_where_the_task_sets_no_end():
@@ -121,6 +123,14 @@ def test_an_episode_lasts_by_the_video_alone_where_the_task_sets_no_end():
     env = rivals.watched(Endless(), classifier.GoalClassifier(43))
     env.reset()
     assert [env.step(np.zeros(2))[3] for _ in range(54)] == [*53 * [False], True]
+
+
+def test_a_rivals_agent_sees_three_frames_and_at_first_the_first_three_times():
+    env = rivals.watched(Endless(), classifier.GoalClassifier(43))
+    seen = [env.reset()[0], *(env.step(np.zeros(2))[0] for _ in range(3))]
+    assert [stack[:, 0, 0, 0].tolist() for stack in seen] == [
+        [7, 7, 7], [7, 7, 8], [7, 8, 9], [8, 9, 10]
+    ]  # fmt: skip
 
 
 def test_the_clip_of_the_recipe_bounds_the_reward():
