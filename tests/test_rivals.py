@@ -252,6 +252,16 @@ def test_all_that_the_stages_of_a_rival_are_given_and_leave_is_what_it_was(
     golden(figures)
 
 
+def test_a_stage_hands_on_what_its_file_holds_as_if_it_were_resumed(tmp_path, monkeypatch):
+    """A translation is kept in half precision."""
+    G = cyclegan.CycleGAN(2, 1)
+    monkeypatch.setattr(cyclegan, "train", lambda *_, **__: (G, []))
+    run = run_in(tmp_path)
+    kept = rivals.learn_translation(film(3), film(2), film(2), TINY, run=run, **ARGS)
+    for p, trained in zip(kept.parameters(), G.parameters(), strict=True):
+        assert torch.equal(p, trained.half().float())
+
+
 def test_a_rivals_policy_is_replayed_on_its_own_task_alone(tmp_path, monkeypatch):
     classifier.save(tmp_path / "classifier.safetensors", classifier.GoalClassifier(20), "push")
     monkeypatch.setattr(sac_ae, "load", lambda path: path.name)
