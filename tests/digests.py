@@ -1,0 +1,12 @@
+"""Arrays too long to be kept whole, as a few figures."""
+
+import numpy as np
+
+
+def digest(array):
+    """Four figures of an array: its mean, its mean size, and two mixtures in which places count
+    differently, so that what is turned round or swapped shows."""
+    a = np.asarray(array, float).ravel()
+    along = np.linspace(0.5, 1.5, len(a))
+    about = 1 + 0.5 * np.cos(7.3 * np.arange(len(a)))
+    return np.array([a.mean(), np.abs(a).mean(), along @ a / len(a), about @ a / len(a)])

@@ -1,0 +1,223 @@
+"""The task files compute what they computed when the shipped results were made."""
+
+import dataclasses
+import functools
+
+import gymnasium as gym
+import numpy as np
+import pytest
+from digests import digest
+
+import tasks
+from tasks.world import expert_actions, film, random_takes
+
+ARMS = ("robot", "human")
+every_task = pytest.mark.parametrize("name", tasks.TASKS)
+
+
+def things(env):
+    """All bodies but the arm: what they weigh, where they stand, what is seen and felt of them."""
+    p = env.world.p
+    for body in map(p.getBodyUniqueId, range(p.getNumBodies())):
+        if body != env.arm.body:
+            links = range(-1, p.getNumJoints(body))
+            yield [
+                *np.concatenate(p.getBasePositionAndOrientation(body)),
+                *(x for k in links for x in p.getDynamicsInfo(body, k)[:2]),
+                *(x for v in p.getVisualShapeData(body) for x in (v[2], *v[3], *v[5], *v[7])),
+                *(x for k in links for c in p.getCollisionShapeData(body, k) for x in c[2:4]),
+                *(x for k in links[1:] for x in joint(p.getJointInfo(body, k))),
+            ]
+
+
+def joint(info):
+    return info[2], *info[6:12], *info[13], *info[14]
+
+
+def flat(row):
+    return np.concatenate([np.ravel(x) for x in row])
+
+
+def short(metres):
+    """To a hundredth of a millimetre, which keeps the files of figures small."""
+    return np.round(np.asarray(metres, float), 5)
+
+
+@every_task
+def test_the_scene_is_built_as_it_was(name, make, golden):
+    """The robot's things behind the table, and a digest of the human's, who has a hundred tiles."""
+    robot, human = ([flat(row) for row in things(make(name, arm))] for arm in ARMS)
+    human_only = human[len(robot) - 1 : -1] if len(human) > len(robot) else human[:1]
+    golden(
+        {
+            "robot's": np.concatenate(robot[1:] or robot),
+            "numbers": [len(robot), len(human)],
+            "human's first": human_only[0],
+            "human's": digest(np.concatenate(human)),
+            "one by one": np.round([row @ np.arange(1, len(row) + 1) for row in human], 2),
+        }
+    )
+
+
+@every_task
+def test_the_scene_looks_as_it_did(name, make, golden):
+    """Means of 7 x 7 fields of a picture, of the start and of a step later."""
+    figures = {}
+    for arm in ARMS:
+        env = make(name, arm)
+        env.reset(seed=1)
+        env.step(np.array([1.0, 0, -1]))
+        picture = env.world.render()
+        figures[arm] = picture.reshape(7, 12, 7, 12, 3).mean((1, 3)).round(1)
+        figures[f"{arm}'s edges"] = digest(np.abs(np.diff(picture.astype(float), axis=1)))
+        figures[f"{arm}'s places"] = env.true_pixels()
+    golden(figures, atol=0.1)
+
+
+@every_task
+def test_starts_are_drawn_as_they_were(name, golden):
+    """Where tip and object start: by jitter, and anywhere; the human's lamp swings meanwhile."""
+    figures = {}
+    for arm in ARMS:
+        env = tasks.bare(name, embodiment=arm, observation="state", jitter=0.05)
+        jittered = [env.reset(seed=seed)[0][:6] for seed in range(4)]
+        options = {"scatter": True}
+        anywhere = [env.reset(seed=seed, options=options)[0][[0, 2, 3]] for seed in range(20)]
+        figures[f"{arm}, moved"] = short(jittered)
+        figures[f"{arm}, anywhere"] = short(anywhere)
+        figures[f"{arm}, drawn next"] = env.np_random.random()
+        env.close()
+    golden(figures, atol=2e-5)
+
+
+@pytest.fixture(scope="module")
+def experts(make):
+    """Recordings of a plain and a human-like expert, by task and arm."""
+
+    @functools.cache
+    def experts(name, arm):
+        env = make(name, arm)
+        rngs = None, np.random.default_rng(1)
+        return [film(env, 0, expert_actions(env, rng))[2] for rng in rngs]
+
+    return experts
+
+
+@every_task
+def test_an_expert_means_to_do_what_it_did(name, experts, golden):
+    golden(
+        {
+            f"{arm} {kind}": [len(done.actions), *digest(done.actions[:12]), *done.actions[-1]]
+            for arm in ARMS
+            for kind, done in zip(("plain", "bent"), experts(name, arm), strict=True)
+        },
+        atol=2e-3,  # the actions are of where the arm is
+    )
+
+
+@every_task
+def test_things_go_where_the_expert_sent_them(name, experts, golden):
+    figures = {}
+    for arm in ARMS:
+        for kind, done in zip(("plain", "bent"), experts(name, arm), strict=True):
+            some = done.states[:: max(1, len(done.states) // 5)]
+            figures[f"{arm} {kind}: way"] = some[:, [0, 2, 3, 5]].round(4)
+            figures[f"{arm} {kind}: done"] = bool(done.success[-1])
+    # m: contact makes much of how a processor rounds, and a hit the most
+    golden(figures, rtol=0, atol=0.012 if name == "slide" else 4e-3)
+
+
+@pytest.fixture(scope="module")
+def takes(make):
+    """Recordings of takes of random motion, the last of them brief, by task and arm."""
+
+    @functools.cache
+    def takes(name, arm):
+        return [take[2] for take in random_takes(make(name, arm), 190, seed=3, take=25)]
+
+    return takes
+
+
+@every_task
+def test_random_motion_is_drawn_as_it_was(name, takes, golden):
+    """Some of the takes begin beside the object, and go towards it for their first half."""
+    figures = {}
+    for arm in ARMS:
+        done = takes(name, arm)
+        figures[f"{arm}: seeds"] = [take.seed for take in done]
+        figures[f"{arm}: scattered"] = [take.scatter for take in done]
+        figures[f"{arm}: frames"] = [len(take.states) for take in done]
+        figures[f"{arm}: actions"] = np.round([digest(take.actions) for take in done], 4)
+    golden(figures, atol=2e-4)
+
+
+@every_task
+def test_random_motion_goes_where_it_went(name, takes, golden):
+    golden(
+        {
+            arm: np.round([take.states[-1, [0, 2, 3]] for take in takes(name, arm)], 4)
+            for arm in ARMS
+        },
+        rtol=0,
+        atol=5e-3,  # m: contact makes much of how a processor rounds
+    )
+
+
+@every_task
+def test_a_task_states_what_it_stated(name, make, golden):
+    """Its recipe, sizes and words, its scene for a person's clip, and its registration."""
+    env, module = make(name), tasks.module(name)
+    env.reset(seed=0)
+    recipe, scene, spec = module.RECIPE, env.scene(), gym.spec(tasks.id_of(name))
+    stated = (env.STEP, env.KP, env.OVERSPEED, env.PUSH_AT, env.CONTACT or -1, module.HORIZON)
+    golden(
+        {
+            "recipe": {k: str(v) for k, v in dataclasses.asdict(recipe).items()},
+            "scene": {k: str(np.round(v, 6)) for k, v in vars(scene).items() if v is not None},
+            "stated": flat([*stated, env.LEASH, env.WORKSPACE, env.START, *env.CAMERA]),
+            "target": env.target_position(),
+            "words": [tasks.sentence(name), tasks.goal(name), spec.id, str(spec.entry_point)],
+            "steps": spec.max_episode_steps,
+            "moves": tasks.moves_object(name),
+            "legs": flat(
+                x for end, seconds, exact in env.waypoints() for x in (end, seconds, exact)
+            ),
+        }
+    )
+
+
+def nearer(env, gap):
+    """The distance to the target is this, and what is asked about moves no more."""
+    way = np.array([0.6, 0, 0.8])
+    env.object_position = lambda: env.target_position() + gap * way
+
+
+@pytest.mark.parametrize(("name", "reach"), [("reach", 0.05), ("push", 0.05), ("coffee", 0.07)])
+def test_success_begins_at_the_papers_distance(name, reach):
+    env = tasks.bare(name, observation="state")
+    env.reset(seed=0)
+    for gap, done in ((0.99 * reach, True), (1.01 * reach, False)):
+        nearer(env, gap)
+        assert env.is_success() is done
+    env.close()
+
+
+def test_a_puck_has_to_rest_within_five_centimetres():
+    env = tasks.bare("slide", observation="state")
+    env.reset(seed=0)
+    for gap, speed, done in (
+        (0.0495, 0.0195, True), (0.0505, 0.0195, False), (0.0495, 0.0205, False),
+    ):  # fmt: skip
+        nearer(env, gap)
+        env.world.p.resetBaseVelocity(env.puck, (0, speed, 0))
+        assert env.is_success() is done
+    env.close()
+
+
+def test_a_drawer_is_shut_from_31_5_millimetres():
+    env = tasks.bare("drawer", observation="state")
+    env.reset(seed=0)
+    for q, done in ((-0.032, False), (-0.0314, True), (0.0, True)):
+        env.world.p.resetJointState(env.drawer, 0, q)
+        assert env.is_success() is done
+    env.close()
