@@ -382,3 +382,54 @@ def test_a_policy_that_sees_keypoints_is_no_policy_of_tracks(tmp_path, capsys):
     replay = ["push", "--method", "tracks", "--evaluate", "--weights", weights]
     assert main([*replay, "--out", str(tmp_path / "run")]) == 2
     assert "41 numbers, and 15 come with this method" in capsys.readouterr().err
+
+
+def test_an_object_followed_for_an_episode_is_told_and_paid_as_it_was(golden):
+    """Beside the demonstration's pace, then lost far away, and on after the end of both."""
+    path = np.array([[0, 0], [0, 0.2], [1.5, 0.4], [4, 1], [7.5, 1.5], [9, 1], [8, 1]])
+    rng, N = np.random.default_rng(4), 12
+    d = np.r_[np.zeros((2, 2)), np.cumsum(rng.uniform(-0.5, 2, (N - 2, 2)), 0)]
+    d[-3] = 40, -70
+    g = np.stack([np.linspace(-12, 3, N), np.linspace(30, -4, N)], 1)
+    figures = {}
+    for horizon in (None, 6):
+        reward = TrackReward(path, horizon=horizon)
+        env = TrackWrapper(Film(np.zeros((N, 84, 84, 3), np.uint8)), Scripted(d, g), reward)
+        rows, paid, parts = [env.reset(seed=0)[0]], [], []
+        for _ in range(N - 1):
+            obs, r, *ends, info = env.step(np.zeros(3, np.float32))
+            assert ends == [False, False] and obs.dtype == np.float32
+            rows.append(obs)
+            paid.append(r)
+            parts.append([*dict.__getitem__(info, "reward_parts").values()])
+        figures[f"{horizon}: told"] = np.array(rows)[[1, 2, 5, 9, 10]].round(4)
+        figures[f"{horizon}: paid"] = paid
+        figures[f"{horizon}: parts"] = np.round(parts, 5)
+        figures[f"{horizon}: of it"] = [
+            reward.L, reward.last, reward.episode, *reward.lam, *reward.d_E[-2],
+            *(reward.clock(t) for t in (0, 1, 3, 99)),
+            *(reward.stretch(np.array(at)) for at in ((0, 0), (3, 1), (-4, 2), (30, 0), (7.3, 0))),
+        ]  # fmt: skip
+    space = env.observation_space
+    figures["space"] = [*space.low[:2], *space.high[:2], *space.shape]
+    golden(figures)
+
+
+def test_what_is_no_path_is_named_with_what_to_give():
+    messages = []
+    for path in (
+        np.zeros((2, 2)),
+        np.zeros((5, 3)),
+        np.zeros((5, 1, 2)),
+        [[0, 0], [1, 0], [2.9, 0]],
+    ):
+        with pytest.raises(InputError) as told:
+            TrackReward(path)
+        messages.append(str(told.value))
+    assert messages == [
+        "path of shape (2, 2): give (N, 2) with N of 3 or more.",
+        "path of shape (5, 3): give (N, 2) with N of 3 or more.",
+        "path of shape (5, 1, 2): give (N, 2) with N of 3 or more.",
+        "the object moves by 2.9 pixels; it takes 3.0.",
+    ]
+    assert TrackReward([[0, 0], [1, 0], [3.1, 0]]).last == 2

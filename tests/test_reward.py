@@ -320,3 +320,110 @@ def test_wrong_input_of_the_mended_reward_is_refused_in_a_sentence(arguments, me
 def test_a_trajectory_of_another_shape_is_refused_by_the_literal_reward(z_E):
     with pytest.raises(InputError, match="shape"):
         LiteralReward(z_E)
+
+
+# What it computed when the results were made ------------------------------------------------------
+
+
+def shown(K=3, n=46, seed=1):
+    """A demonstration that rests, creeps, strikes and rests again, with glitches: (n, K, 2)."""
+    rng = np.random.default_rng(seed)
+    pace = np.r_[[0.0] * 9, np.linspace(0.2, 1, 14), [0.02] * 8, [2.5, 1.5], [0.0] * (n - 33)]
+    way = np.cumsum(pace)[:, None, None] * rng.normal(size=(K, 2)) * 0.02
+    z = rng.uniform(-0.5, 0.5, (K, 2)) + way + 1e-4 * rng.normal(size=(n, K, 2))
+    z[[5, 20]] += 0.3
+    return z
+
+
+FORMS = {
+    "mended": {},
+    "of 30 steps": {"horizon": 30},
+    "of 300 steps": {"horizon": 300},
+    **{f"without {mend}": {mend: False} for mend in MENDS},
+    "as a whole, in 30": {"horizon": 30, "timed": False, "include_goal": False},
+    "with other weights": {"lam": (2.0, 0.5)},
+}
+
+
+@pytest.mark.parametrize("form", ["literal", *FORMS])
+def test_a_walk_beside_the_demonstration_earns_what_it_earned(form, golden):
+    """Near it, far beyond where distances are capped, and after the demonstration's end."""
+    z, robot = shown(), random_walk(3, 90, 0.02)
+    reward = LiteralReward(z) if form == "literal" else MendedReward(z, robot, **FORMS[form])
+    rng = np.random.default_rng(2)
+    ends = reward.z_E[np.linspace(0, len(reward.z_E) - 1, 13).astype(int)]
+    walk = ends + rng.normal(size=ends.shape) * np.geomspace(0.003, 3, 13)[:, None, None]
+    steps = [0, 1, 2, 5, 9, 17, 22, 23, 24, 40, 90, 400]
+    paid = [reward(a, b, t) for (a, b), t in zip(pairwise(walk), steps, strict=True)]
+    figures = {
+        "paid": [r for r, _ in paid],
+        "r1": [parts["r1"] for _, parts in paid],
+        "r2": [parts["r2"] for _, parts in paid],
+        "lam": reward.lam,
+        "frames": [len(reward.z_E), len(reward.v_E), reward.episode],
+        "way": reward.z_E[::7, 1, 0],
+        "timed": reward.timed,
+    }
+    if form != "literal":
+        figures |= {
+            "path": reward.path,
+            "clock": [reward.clock(t) for t in steps],
+            "target": [reward.target(t)[0, 1] for t in steps],
+        }
+    golden(figures)
+
+
+def test_demonstrations_are_made_the_robots_own_as_they_were(golden):
+    """Slow and fast robots, pauses cut to several lengths, and few frames or many."""
+    z, figures = shown(), {}
+    for pace in (0.005, 0.02, 0.2):
+        for horizon in (None, 20, 90):
+            own = prepare(z, random_walk(3, 60, pace, 4), horizon=horizon)
+            figures[f"{pace}, {horizon}"] = [
+                len(own),
+                own.mean(),
+                own.std(),
+                *own[len(own) // 2, 0],
+            ]
+    for least, rest in ((0.01, 0), (0.01, 3), (0.05, 1), (0.2, 2)):
+        cut = trim_pauses(z, least, rest)
+        figures[f"pauses {least}, {rest}"] = [len(cut), cut.mean(), cut[1, 0, 0], cut[-2, 0, 0]]
+    for step, longest in ((0.01, 400), (0.01, 40), (0.5, 400), (0.5, 12), (0.03, 1000)):
+        some = resample(z, step, longest)
+        figures[f"{step} in {longest}"] = [len(some), some.mean(), *some[3, 1], *some[-2, 1]]
+    golden(figures)
+
+
+@pytest.mark.parametrize(("way", "moves"), [(3e-6, True), (3e-7, False)])
+def test_a_demonstration_moves_by_a_millionth_or_does_not(way, moves):
+    z = line(0, way / 2, way, way, way)
+    if moves:
+        assert MendedReward(z, z, trim=False, speed=False).path == pytest.approx(way)
+    else:
+        with pytest.raises(InputError) as told:
+            MendedReward(z, z, trim=False, speed=False)
+        assert str(told.value) == (
+            "nothing moves in the demonstration; give a video that shows the skill."
+        )
+
+
+def test_what_is_no_trajectory_is_named_with_what_to_give():
+    messages = []
+    for z, robot in (
+        (np.zeros((2, 4, 2)), None), (np.zeros((5, 4, 3)), None), (np.zeros((5, 2)), None),
+        (shown(2), np.zeros((2, 2, 2))), (shown(2), np.zeros((9, 3, 2))),
+        (shown(2), np.zeros((9, 4))),
+    ):  # fmt: skip
+        with pytest.raises(InputError) as told:
+            LiteralReward(z) if robot is None else MendedReward(z, robot)
+        messages.append(str(told.value))
+    shapes = "(2, 4, 2)", "(5, 4, 3)", "(5, 2)"
+    assert messages[:3] == [
+        f"keypoint trajectory of shape {shape}: give (N, K, 2) with N of 3 or more."
+        for shape in shapes
+    ]
+    shapes = "(2, 2, 2)", "(9, 3, 2)", "(9, 4)"
+    assert messages[3:] == [
+        f"robot keypoints of shape {shape}: give (M, 2, 2), M >= 3." for shape in shapes
+    ]
+    np.testing.assert_array_equal(LiteralReward(np.zeros((3, 1, 2)))(*np.zeros((2, 1, 2)))[0], 0)

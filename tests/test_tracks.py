@@ -247,3 +247,78 @@ def test_the_drawn_points_are_the_objects():
         expected = np.unique((shown.points + shown.path[t]).round().astype(int), axis=0)
         assert len(yellow) == len(expected)
         assert {*map(tuple, yellow.tolist())} == {*map(tuple, expected.tolist())}
+
+
+def pushed(wall, at=(0, 0), n=12, arm=True):
+    """A square that rests and is then pushed right and down by an arm from the left, two tones."""
+    frames = []
+    for i in range(n):
+        d = max(0, i - 4) * np.array([1.3, 0.4])
+        frame = scene(HERE + d + at, wall)
+        if arm:
+            x, y = (HERE + at + (-16 + 2 * min(i, 8), 3)).round().astype(int)
+            frame[y : y + 5, : max(1, x)] = (205, 180, 90)
+            frame[y : y + 3, max(1, x) : x + 3] = (150, 140, 110)
+        frames.append(frame)
+    return np.stack(frames)
+
+
+def test_an_object_that_is_pushed_is_seen_as_it_was(golden):
+    """In the demonstration, and elsewhere before another wall; the arm hides it for a while."""
+    demo, other = pushed(texture()), texture(5) * 0.8 + 25
+    shown = tracks.watch(demo)
+    film_ = pushed(other, at=(9, -4), n=14)
+    film_[7, 30:48, 41:46] = 20  # a bar before some of its points
+    wall = tracks.background(np.concatenate([film_, pushed(other, at=(9, -30), n=9)]))
+    seen = tracks.Tracker(shown, wall)
+    seen.reset(film_[0])
+    rows = [[*seen.d, *seen.g, *seen.v, seen.kept.sum()]]
+    for frame in film_[1:]:
+        seen.step(frame)
+        rows.append([*seen.d, *seen.g, *seen.v, seen.kept.sum()])
+    golden(
+        {
+            "path": shown.path[::2],
+            "points": shown.points,
+            "patch": [*shown.corner, *shown.patch.shape, shown.mask.sum(), shown.patch.mean()],
+            "behind": shown.behind,
+            "wall": wall.reshape(3, 28, 3, 28, 3).mean((1, 3)),
+            "ahead": seen.ahead,
+            "followed": np.round(rows, 3),
+            "drawn": tracks.draw(demo).astype(float).mean((1, 2))[:, 0],
+        },
+        rtol=2e-3,
+        atol=0.02,  # pixels: flow ends where it moves by less than 0.01
+    )
+
+
+def test_corners_groups_and_backgrounds_are_what_they_were(golden):
+    rng = np.random.default_rng(0)
+    picture = scene(HERE, texture())
+    where = np.zeros((84, 84))
+    where[20:60, 10:70] = 1
+    found = tracks.corners(picture, where)
+    d = rng.normal(size=(6, 9, 2)) * 0.4 + np.array([0.0, 0, 0, 2, 2, 2, 2, 5, 5])[:, None]
+    film_ = rng.integers(90, 110, (11, 84, 84, 3)).astype(np.uint8)
+    film_[:6, 10:40] = rng.integers(0, 255, (6, 1, 1, 3))
+    golden(
+        {
+            "corners": [len(found), *found[0], *found[-1], *found.mean(0)],
+            "in all": len(tracks.corners(picture)),
+            "kind": str(found.dtype),
+            "alike": tracks.together(d),
+            "by weight": tracks.together(d, np.r_[np.full(7, 1.0), 9, 9]),
+            "none": tracks.together(d[:, :0]),
+            "wall": [tracks.background(film_)[y, 5].mean() for y in (20, 60)],
+            "wall's mean": tracks.background(film_).mean((0, 1)),
+        }
+    )
+
+
+def test_who_moves_no_object_is_told_so():
+    still = np.repeat(scene(HERE, texture())[None], 6, axis=0)
+    with pytest.raises(InputError) as told:
+        tracks.watch(still)
+    assert str(told.value) == (
+        "no object rests first and moves later in the demonstration; tracks follow one."
+    )

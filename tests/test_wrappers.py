@@ -184,3 +184,91 @@ def test_stable_baselines_trains_on_it(reward):
     agent.learn(100)
     action, _ = agent.predict(env.reset(seed=0)[0], deterministic=True)
     assert env.action_space.contains(action)
+
+
+class Tells(gym.Env):
+    """Tells what is asked of it, and ends as it is told to. A reset does not look like a step."""
+
+    observation_space = gym.spaces.Box(0, 255, (84, 84, 3), np.uint8)
+    action_space = gym.spaces.Box(-1, 1, (3,), np.float32)
+
+    def __init__(self, ends=(False, False)):
+        self.ends, self.asked = ends, []
+
+    def reset(self, *, seed=None, options=None):
+        self.asked.append((seed, options))
+        self.t = 0
+        return self.frame(), {"started": True}
+
+    def step(self, action):
+        self.asked.append(np.asarray(action).tolist())
+        self.t += 1
+        return self.frame(), 99.0, *self.ends, {"is_success": self.t == 2, "t": self.t}
+
+    def frame(self):
+        return np.full((84, 84, 3), 20 * self.t, np.uint8)
+
+
+def eye(frames):
+    """Keypoints (B, 3, 2) that go their own ways as a frame gets lighter, one out of it."""
+    t = frames[:, 0, 0, 0].astype(float)[:, None, None] / 20
+    return np.array([[0.1, -0.2], [0.6, 0.3], [-0.5, 0.05]]) + t * [
+        [0.02, 0.01], [0.15, -0.03], [-0.07, 0.04],
+    ]  # fmt: skip
+
+
+def demonstrated(n=9):
+    t = np.arange(n)[:, None, None]
+    return np.array([[0.1, -0.2], [0.5, 0.3], [-0.4, 0.1]]) + t * 0.03 * np.array(
+        [[1, 0.5], [2, -1], [-1, 3]]
+    )
+
+
+@pytest.mark.parametrize("form", ["mended", "untimed", "literal"])
+def test_an_episode_is_told_and_paid_as_it_was(form, golden):
+    z = demonstrated()
+    switches = {"trim": False, "timed": form == "mended"}
+    reward = LiteralReward(z) if form == "literal" else MendedReward(z, z, **switches)
+    env = KeypointRewardWrapper(KeypointObservation(Tells(), eye), reward)
+    rows, paid, infos = [env.reset(seed=3, options={"scatter": True})[0]], [], []
+    for t in range(11):
+        obs, r, *ends, info = env.step(np.full(3, t / 10))
+        assert ends == [False, False] and env.observation_space.contains(obs)
+        rows.append(obs)
+        paid.append(r)
+        infos.append(info)
+    again, info = env.reset()
+    assert info == {"started": True} and env.unwrapped.asked[0] == (3, {"scatter": True})
+    np.testing.assert_array_equal(again, rows[0])
+    space = env.observation_space
+    golden(
+        {
+            "told": np.array(rows)[[0, 1, 2, 3, 7, 10, 11]],
+            "paid": paid,
+            "parts": [info["reward_parts"]["r1"] for info in infos],
+            "beside": [str(sorted(infos[1])), str(infos[1]["is_success"]), str(infos[2]["t"])],
+            "bounds": [space.low, space.high],
+            "type": str(space.dtype),
+            "asked": str(env.unwrapped.asked[2]),
+        }
+    )
+
+
+@pytest.mark.parametrize("ends", [(True, False), (False, True), (True, True)])
+@pytest.mark.parametrize("kind", ["keypoints", "classifier"])
+def test_however_a_task_ends_the_episode_is_cut(kind, ends):
+    class Goal:
+        def __call__(self, frame):
+            return frame.mean() / 10, {"logit": float(frame.mean())}
+
+    env = Tells(ends)
+    if kind == "keypoints":
+        env = KeypointRewardWrapper(KeypointObservation(env, eye), LiteralReward(demonstrated()))
+    else:
+        env = ClassifierRewardWrapper(env, Goal())
+    env.reset()
+    obs, r, terminated, truncated, info = env.step(np.zeros(3))
+    assert (terminated, truncated) == (False, True)
+    if kind == "classifier":
+        assert r == 2 and obs.mean() == 20  # of the frame that the step led to
+        assert info == {"is_success": False, "t": 1, "reward_parts": {"logit": 20.0}}
