@@ -1,12 +1,13 @@
 """The method as a whole, on data too small to learn anything from."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import torch
 from gymnasium.envs.registration import EnvSpec
-from toy_push import ToyPush
+from toy_push import ToyPush, demonstration, detect, random_frames
 
 from lbw_minimal import munit, sac, transporter
 from lbw_minimal.imitate import (
@@ -15,6 +16,7 @@ from lbw_minimal.imitate import (
     Run,
     imitate,
     learn_perception,
+    learn_policy,
     load_perception,
     make_reward,
     watched,
@@ -197,3 +199,138 @@ def test_a_stage_leaves_its_time_and_none_of_its_files(tmp_path):
     assert run.metrics["stages"]["policy"] == pytest.approx(90, abs=1)
     assert [path.name for path in tmp_path.glob("policy*")] == ["policy.safetensors"]
     assert Run(tmp_path).metrics == run.metrics
+
+
+def test_a_recipe_is_what_it_was_unless_a_task_says_otherwise():
+    assert vars(Recipe(human_frames=400, robot_frames=1200)) == {
+        "human_frames": 400,
+        "robot_frames": 1200,
+        "munit_iterations": 1200,
+        "munit_width": 20,
+        "transporter_iterations": 600,
+        "K": 5,
+        "shift": 0,
+        "hue": 0,
+        "policy_steps": 3000,
+        "updates": 2,
+        "entropy": -1.0,
+        "motion": False,
+        "classifier_iterations": 10_000,
+        "random_negatives": True,
+        "clip": 10.0,
+        "pixel_updates": 1,
+        "hold": 10,
+    }
+
+
+def test_a_perception_learns_and_sees_what_it_did(tmp_path, golden):
+    """One step of either network: its log, its files, and what the trained see in the video."""
+    human, still, robot = frames(6), frames(5), frames(7)
+    run = Run(tmp_path)
+    P = learn_perception(human, still, robot, TINY, task="push", seed=3, run=run)
+    P.watch(human)
+    logs = {name: json.loads((tmp_path / f"{name}.json").read_text()) for name in LOGS}
+    golden(
+        {
+            "files": sorted(path.name for path in tmp_path.iterdir()),
+            "stages": list(run.metrics["stages"]),
+            "rows": [str(sorted(row)) for rows in logs.values() for row in rows],
+            "style": P.style,
+            "translated": P.translated.astype(float).mean((1, 2)).round(1),
+            "seen": P.z_E[:, :, 0],
+            "robot": P.detect(robot)[:3, 1],
+        },
+        rtol=2e-2,  # of whole grey levels
+        atol=2e-3,
+    )
+
+
+LOGS = ("translation_log", "keypoints_log")
+
+
+def test_the_stages_know_their_device_checkpoint_and_file(tmp_path, monkeypatch):
+    """All that they are asked for and all that they leave is theirs and no other stage's."""
+    told, V = [], (np.zeros((3, 84, 84, 3), np.uint8), np.ones((4, 84, 84, 3), np.uint8))
+
+    def train(stage):
+        def train(*data, checkpoint, **how):
+            told.append((stage, [len(x) for x in data], checkpoint.path.name, how["device"]))
+            checkpoint.save(lambda: {}, force=True)
+            return stage, [{"stage": stage}]
+
+        return train
+
+    def save(path, network, *rest):
+        told.append(("saved", path.name, network, rest))
+        path.write_text("")
+
+    def load(path, task):
+        told.append(("loaded", path.name, task))
+        return ("T", "style") if path.name.startswith("translation") else "Psi"
+
+    for part, stage in ((munit, "translation"), (transporter, "keypoints")):
+        monkeypatch.setattr(part, "train", train(stage))
+        monkeypatch.setattr(part, "save", save)
+        monkeypatch.setattr(part, "load", load)
+    monkeypatch.setattr(munit, "robot_style", lambda T, robot: f"{T} of {len(robot)}")
+    monkeypatch.setattr(munit, "translate", lambda T, x, style: x)
+    P = learn_perception(*V, V[0][:2], TINY, task="coffee", seed=0, run=Run(tmp_path), device="toy")
+    assert told == [
+        ("translation", [7, 2], "translation.checkpoint", "toy"),
+        ("saved", "translation.safetensors", "translation", ("translation of 2", "coffee")),
+        ("loaded", "translation.safetensors", "coffee"),
+        ("keypoints", [3], "keypoints.checkpoint", "toy"),
+        ("saved", "keypoints.safetensors", "keypoints", ("coffee",)),
+        ("loaded", "keypoints.safetensors", "coffee"),
+    ]
+    assert (P.translator, P.style, P.detector) == ("T", "style", "Psi")
+    for log, stage in zip(LOGS, ("translation", "keypoints"), strict=True):
+        assert (tmp_path / f"{log}.json").read_text() == f'[{{"stage": "{stage}"}}]\n'
+    told.clear()
+    loaded = load_perception(tmp_path, "coffee")
+    assert (loaded.translator, loaded.style, loaded.detector) == ("T", "style", "Psi")
+    monkeypatch.setattr(sac, "train", train("policy"))
+    monkeypatch.setattr(sac, "save", save)
+    monkeypatch.setattr(sac, "load", lambda path: f"{path.name} {told.clear()}")
+    monkeypatch.setattr(
+        sac, "train", lambda env, checkpoint, **how: (checkpoint.path.name, [how | {"env": env}])
+    )
+    for _ in range(2):  # the second time it is there
+        assert learn_policy("env", TINY, 8, Run(tmp_path)) == "policy.safetensors None"
+    assert json.loads((tmp_path / "policy_log.json").read_text()) == [
+        {"steps": 3000, "updates": 2, "entropy": -1.0, "seed": 8, "env": "env"}
+    ]
+    assert list(Run(tmp_path).metrics["stages"]) == ["translation", "keypoints", "policy"]
+    assert not [*tmp_path.glob("*.checkpoint")]
+    assert (tmp_path / "metrics.json").read_text().startswith('{\n "stages": {\n  "translation": ')
+
+
+def test_a_run_in_a_new_folder_has_no_metrics_yet(tmp_path):
+    assert Run(tmp_path).metrics == {"stages": {}}
+    with pytest.raises(InputError) as told:
+        make_reward(None, None, "free")
+    assert str(told.value) == "reward form 'free': choose 'literal' or 'mended'."
+
+
+def test_a_policy_is_what_it_became(tmp_path, golden):
+    """From an episode's frames to an action, after 40 steps with few updates, of a toy task."""
+    P = Perception(None, None, None)
+    P.translate = lambda frames: frames
+    P.detect = lambda frames: detect(frames)
+    env, demo, robot = ToyPush(), demonstration(), random_frames(60)
+    env.spec = EnvSpec("Toy-v0", max_episode_steps=30)
+    recipe = replace(TINY, policy_steps=6, updates=1)
+    policy, seen = imitate(env, demo, robot, P, recipe, seed=2, run=Run(tmp_path))
+    z, _ = seen.reset(seed=0)
+    _, r, _, _, info = seen.step(np.array([1.0, -0.5, 0]))
+    golden(
+        {
+            "told": z,
+            "paid": [r, *info["reward_parts"].values()],
+            "acts": policy.act(z, deterministic=True),
+            "steps": seen._max_episode_steps,
+            "log": len(json.loads((tmp_path / "policy_log.json").read_text())),
+        },
+        rtol=1e-2,
+        atol=1e-4,
+    )

@@ -263,33 +263,40 @@ def pushed(wall, at=(0, 0), n=12, arm=True):
     return np.stack(frames)
 
 
-def test_an_object_that_is_pushed_is_seen_as_it_was(golden):
-    """In the demonstration, and elsewhere before another wall; the arm hides it for a while."""
-    demo, other = pushed(texture()), texture(5) * 0.8 + 25
-    shown = tracks.watch(demo)
+def elsewhere():
+    """The push again, before another wall and behind a bar for a frame, and that wall."""
+    other = texture(5) * 0.8 + 25
     film_ = pushed(other, at=(9, -4), n=14)
-    film_[7, 30:48, 41:46] = 20  # a bar before some of its points
-    wall = tracks.background(np.concatenate([film_, pushed(other, at=(9, -30), n=9)]))
-    seen = tracks.Tracker(shown, wall)
-    seen.reset(film_[0])
-    rows = [[*seen.d, *seen.g, *seen.v, seen.kept.sum()]]
-    for frame in film_[1:]:
-        seen.step(frame)
-        rows.append([*seen.d, *seen.g, *seen.v, seen.kept.sum()])
+    film_[7, 30:48, 41:46] = 20
+    return film_, tracks.background(np.concatenate([film_, pushed(other, at=(9, -30), n=9)]))
+
+
+def test_an_object_that_is_pushed_is_seen_as_it_was(golden):
+    demo = pushed(texture())
+    shown = tracks.watch(demo)
     golden(
         {
             "path": shown.path[::2],
             "points": shown.points,
             "patch": [*shown.corner, *shown.patch.shape, shown.mask.sum(), shown.patch.mean()],
             "behind": shown.behind,
-            "wall": wall.reshape(3, 28, 3, 28, 3).mean((1, 3)),
-            "ahead": seen.ahead,
-            "followed": np.round(rows, 3),
+            "wall": elsewhere()[1].reshape(3, 28, 3, 28, 3).mean((1, 3)).round(2),
             "drawn": tracks.draw(demo).astype(float).mean((1, 2))[:, 0],
         },
-        rtol=2e-3,
         atol=0.02,  # pixels: flow ends where it moves by less than 0.01
     )
+
+
+def test_an_object_that_is_pushed_elsewhere_is_followed_as_it_was(golden):
+    """What is kept of its points, and with them the median, hangs on a pixel's hundredth."""
+    (first, *film_), wall = elsewhere()
+    seen = tracks.Tracker(tracks.watch(pushed(texture())), wall)
+    seen.reset(first)
+    rows = [[*seen.d, *seen.g, *seen.v]]
+    for frame in film_:
+        seen.step(frame)
+        rows.append([*seen.d, *seen.g, *seen.v])
+    golden({"ahead": seen.ahead, "followed": np.round(rows, 2)}, rtol=0, atol=0.1)
 
 
 def test_corners_groups_and_backgrounds_are_what_they_were(golden):
