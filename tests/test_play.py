@@ -184,3 +184,85 @@ def test_a_slider_can_be_used_by_its_keys_and_says_its_name():
         "0.2",
         "0.3",
     ]
+
+
+def test_sliders_and_strips_are_laid_out_as_they_were():
+    """The middle of an even number of values is the upper; 30 rem wide; four settings a strip."""
+    part = play.slider("a", (1, 2.5, 1e-7, 4))
+    assert part.value == 1e-7 and [name for name, _ in part.options] == ["1", "2.5", "1e-07", "4"]
+    assert (part.layout.width, part.layout.max_width) == ("30rem", "100%")
+    assert play.spread_settings({"a": range(11)}) == [{"a": a} for a in (0, 3, 7, 10)]
+    assert play.spread_settings({"a": range(11)}, 3) == [{"a": a} for a in (0, 5, 10)]
+    with pytest.raises(ValueError) as told:
+        play.spread_settings({})
+    assert str(told.value) == "0 sliders: say by `shown` which settings the strip has."
+    assert play.said({"x": 0.1, "y": 2.0}) == "x 0.1, y 2"
+    sliders = Sliders(noted([]), {"a": (1, 2), "b": (3, 4)}, [{"a": 1, "b": 3}])
+    figure = sliders.figure([{"a": 1, "b": 3}] * 3, larger=2.0)
+    assert figure.get_size_inches().tolist() == pytest.approx([3 * 2 * 3.1, 2 * 3.1])
+    assert len(figure.axes) == 3 and play.SIDE == 3.1
+    names = [child.description for child in sliders.widget.children[:2]]
+    assert names == ["a", "b"] and sliders.widget.children[2] is sliders.image
+
+
+def test_a_drawing_gets_its_own_axis_and_settings():
+    seen = []
+    sliders = Sliders(lambda axis, **of: seen.append((axis, of)), {"a": (1, 2, 3)})
+    figure = sliders.figure([{"a": 1}, {"a": 3}])
+    assert seen[1:] == [(figure.axes[0], {"a": 1}), (figure.axes[1], {"a": 3})]
+    assert seen[0][1] == {"a": 2}
+
+
+def test_curves_are_drawn_as_they_were():
+    """Dots of 4 points on a line of 1.2, colours in an order of their own, the legend below."""
+    curves = Curves("step", "return", every=np.inf)
+    for k, name in enumerate("abcdefg"):
+        curves.add(name, k, 2 * k)
+        curves.add(name, k + 1, 2 * k + 1)
+    figure = curves.figure()
+    (axis,) = figure.axes
+    assert figure.get_size_inches().tolist() == [6.4, 3]
+    order = (1, 4, 2, 3, 0, 5, 1)
+    for k, (line, colour) in enumerate(zip(axis.lines, order, strict=True)):
+        assert line.get_color() == play.COLOURS[colour]
+        assert line.get_xydata().tolist() == [[k, 2 * k], [k + 1, 2 * k + 1]]
+        style = line.get_marker(), line.get_linestyle(), line.get_markersize(), line.get_linewidth()
+        assert style == (".", "-", 4, 1.2)
+    assert axis.get_legend()._get_loc() == 4  # lower right
+
+
+def test_a_curve_is_shown_when_more_time_than_asked_has_gone(monkeypatch):
+    """The first point at once, a second one after just two seconds not yet."""
+    now, shown, handles = [50.0], [], []
+    monkeypatch.setattr(play.time, "monotonic", lambda: now[0])
+    handle = SimpleNamespace(update=lambda figure: shown.append("again"))
+    monkeypatch.setattr(
+        play, "display", lambda *_, **of: handles.append(of) or shown.append("new") or handle
+    )
+    curves = Curves("x", "y")
+    assert curves.every == 2.0
+    for now[0] in (50.0, 52.0, 52.1, 53.0):
+        curves.add("a", 0, 0)
+    assert shown == ["new", "again"] and handles == [{"display_id": True}]
+
+
+def test_what_an_episode_earned_is_told_from_its_own_beginning():
+    """A reset in the middle of an episode starts its sum and its place anew; options go on."""
+
+    class Env(gym.Env):
+        def reset(self, **options):
+            asked.append(options)
+            return 0, {}
+
+        def step(self, action):
+            return 0, action, action == 3, False, {}
+
+    told, asked = [], []
+    env = Told(Env(), lambda *what: told.append(what), 4)
+    for actions in ((1, 2), (1, 3), (3,), (3,)):
+        env.reset(seed=len(actions))
+        for action in actions:
+            env.step(action)
+    # the third episode begins with the fifth step, and four are those of the training
+    assert told == [(4, 4.0)] and env.steps == 6 and env.earned == 3.0
+    assert asked == [{"seed": n} for n in (2, 2, 1, 1)]

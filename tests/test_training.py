@@ -292,3 +292,160 @@ def test_a_wait_shows_a_bar_and_a_moment_does_not(capsys, monkeypatch):
     monkeypatch.setattr(training, "progress", lambda *a, delay: real(*a))  # 3 s have gone by
     assert list(training.counted(iter("abc"), 3, "letters"))
     assert "letters: 100%" in capsys.readouterr().err
+
+
+# What it says and does to the letter --------------------------------------------------------------
+
+
+def test_a_file_is_written_beside_its_place_and_put_there_when_it_is_safe(tmp_path, monkeypatch):
+    """A text as UTF-8, bytes as they are; by another name until all of it is on the disk."""
+    done, path = [], tmp_path / "a.json"
+    real = training.os.fsync, training.os.replace
+
+    def there():
+        return sorted(file.name for file in tmp_path.iterdir())
+
+    def fsync(f):
+        done.append(("safe", there(), (tmp_path / ".a.json.part").read_bytes()))
+        real[0](f)
+
+    def replace(old, new):
+        done.append(("put", Path(old).name, Path(new).name))
+        real[1](old, new)
+
+    monkeypatch.setattr(training.os, "fsync", fsync)
+    monkeypatch.setattr(training.os, "replace", replace)
+    training.write_atomic(str(path), "ü\n")
+    assert done == [
+        ("safe", [".a.json.part"], "ü\n".encode()),
+        ("put", ".a.json.part", "a.json"),
+    ]
+    training.write_atomic(path, b"\r\n\xff")
+    assert path.read_bytes() == b"\r\n\xff" and there() == ["a.json"]
+
+
+def test_all_that_a_state_may_hold_comes_back_as_what_it_was(tmp_path):
+    state = {
+        "none": None, "yes": True, "text": "a/b", "deep": {1: {"x": [1.5, (2, "c")]}, "1": -3},
+        "array": np.arange(6, dtype=np.int16).reshape(2, 3)[:, ::2].copy(),
+        "view": torch.arange(6.0).reshape(2, 3).T, "scalar": torch.tensor(7),
+        "learnt": torch.ones(2, requires_grad=True) * 2, "empty": {}, "nothing": [],
+        "here": [torch.zeros(1), {"t": torch.ones(1)}],
+    }  # fmt: skip
+    save_state(tmp_path / "s", state)
+    back = load_state(tmp_path / "s")
+    assert list(back) == list(state)
+    assert (back["none"], back["yes"], back["text"]) == (None, True, "a/b")
+    assert back["deep"] == {1: {"x": [1.5, [2, "c"]]}, "1": -3}
+    assert back["array"].dtype == torch.int16 and back["array"].tolist() == [[0, 2], [3, 5]]
+    assert back["view"].tolist() == [[0, 3], [1, 4], [2, 5]] and back["scalar"].item() == 7
+    assert back["learnt"].tolist() == [2, 2] and not back["learnt"].requires_grad
+    assert (back["empty"], back["nothing"]) == ({}, [])
+    assert back["here"][0].tolist() == [0] and back["here"][1]["t"].tolist() == [1]
+
+
+def test_weights_of_another_kind_or_task_are_named_with_the_remedy(tmp_path):
+    path = tmp_path / "w"
+    save_state(path, {"kind": "munit", "task": "push", "w": 1})
+    assert training.load_weights(path, "munit", "a MUNIT", "push")["w"] == 1
+    assert training.load_weights(path, "munit", "a MUNIT", None)["w"] == 1
+    for kind, task, what in (
+        ("sac", "push", "not the weights of a policy; give the file that its training wrote."),
+        (
+            "munit", "slide",
+            "weights of the task push, not of slide; give those of slide or train anew.",
+        ),
+    ):  # fmt: skip
+        with pytest.raises(InputError) as told:
+            training.load_weights(path, kind, "a policy", task)
+        assert str(told.value) == f"{path}: {what}"
+    save_state(path, {"w": 1})
+    with pytest.raises(InputError, match="not the weights of a policy"):
+        training.load_weights(path, "sac", "a policy", None)
+    for ruined in (b"", b"\0" * 40):
+        path.write_bytes(ruined)
+        with pytest.raises(InputError) as told:
+            load_state(path)
+        assert str(told.value) == f"{path}: not a complete weights file; delete it and train again."
+    with pytest.raises(InputError) as told:
+        load_state(tmp_path)  # a folder
+    assert str(told.value) == (
+        f"{tmp_path}: there is no such file; train first or give another path."
+    )
+
+
+@pytest.mark.parametrize(("system", "most"), [("linux", 7 * 1024), ("darwin", 7)])
+def test_a_systems_memory_is_told_in_bytes(system, most, monkeypatch):
+    import resource
+
+    monkeypatch.setattr(training.sys, "platform", system)
+    monkeypatch.setattr(
+        resource, "getrusage", lambda who: type("Used", (), {"ru_maxrss": 7 if who == 0 else 99})
+    )
+    assert training.peak_memory() == most
+    monkeypatch.setitem(sys.modules, "resource", None)  # as on Windows
+    assert training.peak_memory() is None
+
+
+def test_seeds_are_those_of_the_results():
+    """Torch's generator and NumPy's begin with the same number."""
+    rng = seed_everything(5)
+    assert (
+        rng.integers(1000, size=3).tolist()
+        == np.random.default_rng(5).integers(1000, size=3).tolist()
+    )
+    torch.testing.assert_close(torch.rand(2), torch.rand(2, generator=torch.manual_seed(5)))
+
+
+@pytest.mark.parametrize(("terminal", "every"), [(True, 0.3), (False, 15)])
+def test_a_bar_goes_on_where_it_was_and_a_log_is_not_filled_with_it(terminal, every, monkeypatch):
+    monkeypatch.setattr(training.sys.stderr, "isatty", lambda: terminal, raising=False)
+    asked = []
+    monkeypatch.setattr(training, "tqdm", lambda **of: asked.append(of))
+    training.progress(50, "policy", start=20)
+    training.progress(5, "film", delay=1.5)
+    usual = {"mininterval": every, "ncols": 100}
+    assert asked == [
+        {"total": 50, "initial": 20, "desc": "policy", "delay": 0} | usual,
+        {"total": 5, "initial": 0, "desc": "film", "delay": 1.5} | usual,
+    ]
+
+
+def test_things_are_counted_one_by_one_behind_a_bar_that_waits_three_seconds(monkeypatch):
+    seen = []
+
+    class Bar:
+        def __init__(self, *asked, **options):
+            seen.append((asked, options))
+
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *_):
+            seen.append("closed")
+
+        def update(self):
+            seen.append("counted")
+
+    monkeypatch.setattr(training, "progress", Bar)
+    for thing in training.counted("ab", 2, "letters"):
+        seen.append(thing)
+    assert seen == [((2, "letters"), {"delay": 3}), "a", "counted", "b", "counted", "closed"]
+
+
+def test_a_checkpoint_holds_the_time_and_starts_its_wait_anew(tmp_path, monkeypatch):
+    clock = Clock(monkeypatch)
+    checkpoint = Checkpoint(str(tmp_path / "state"), seconds=10)
+    clock.now += 10  # just as long is not longer
+    checkpoint.save(lambda: pytest.fail("made a state"))
+    clock.now += 1
+    checkpoint.save(lambda: {"step": 1})
+    assert load_state(tmp_path / "state")["spent"] == 11
+    clock.now += 9
+    checkpoint.save(lambda: {"step": 2}, force=True)
+    assert load_state(tmp_path / "state").keys() == {"state", "torch_rng", "spent"}
+    clock.now += 9
+    checkpoint.save(lambda: pytest.fail("made a state"))  # what was forced counts, too
+    assert checkpoint.load() == {"step": 2}
+    assert checkpoint.spent == 29 + 20  # what was saved, and what this one has taken so far
+    assert Checkpoint("").path is None

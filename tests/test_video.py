@@ -282,3 +282,140 @@ def test_no_frames_write_no_file(tmp_path):
     with pytest.raises(InputError, match=r"mine\.mp4: there are no frames to write"):
         video.write(tmp_path / "mine.mp4", [], 25)
     assert list(tmp_path.iterdir()) == []
+
+
+# What it says and asks for, to the letter ---------------------------------------------------------
+
+
+def clip_of(frames, fps=25, cuts=(), losses=()):
+    """A clip as `read_clip` gives it."""
+    from lbw_minimal.clips.reader import Clip
+
+    known = {"frames": frames, "times": np.arange(len(frames)) / fps, "cuts": list(cuts)}
+    fields = {name: known.get(name, []) for name in Clip.__annotations__}
+    return Clip(**fields | {"losses": list(losses)})
+
+
+def test_all_that_is_odd_about_a_video_is_told_in_order(tmp_path, monkeypatch):
+    """Losses, the first five of its cuts, too many frames, a camera that moves."""
+    frames = film(36, 100)
+    shake = np.random.default_rng(0).integers(-3, 4, len(frames))
+    for i, by in enumerate(shake):
+        frames[i] = np.roll(frames[i], by, axis=1)
+    cuts, asked = [4, 8, 12, 15, 18, 21], []
+
+    def read_clip(path, cuts_wanted=None, **options):
+        asked.append((path, options))
+        return clip_of(frames, cuts=cuts, losses=["it lost a thing."])
+
+    monkeypatch.setattr(video, "read_clip", read_clip)
+    monkeypatch.setattr(video, "MAX_FRAMES", 7)
+    monkeypatch.setattr(video, "steady", lambda clip: clip_of(frames[21:]))
+    found, told = video.read("my.mp4")
+    assert len(found) == 5 and asked == [("my.mp4", {"cuts": True})]
+    assert told == [
+        "my.mp4: it lost a thing.",
+        "my.mp4: it jumps at 0.2 s, 0.3 s, 0.5 s, 0.6 s, 0.7 s; the longest of 7 pieces is used, "
+        "0.6 of 1.4 s.",
+        "my.mp4: 15 frames are many; every 3th is used, 5 in all.",
+        "my.mp4: the camera seems to move; put it on a stand, or keypoints will follow it.",
+    ]
+    video.read("my.mp4", whole=True)
+    assert asked[1] == ("my.mp4", {"cuts": False})
+
+
+def test_frames_are_taken_as_they_were(tmp_path, monkeypatch, golden):
+    """Of a high and a wide clip of 40 frames a second: which, and what is at which place."""
+    figures = {}
+    for name, (h, w) in {"high": (231, 101), "wide": (90, 187)}.items():
+        side = np.arange(h)[:, None] * 0.5 + np.arange(w) * 0.7
+        frames = np.repeat((side % 200)[None, ..., None], 50, axis=0) + [0.0, 20, 50]
+        for t in range(50):
+            frames[t, h // 3 : h // 2, : w // 3 + t] = 30 + 4 * t
+        monkeypatch.setattr(
+            video, "read_clip", lambda *_, f=frames, **__: clip_of(f.astype(np.uint8), fps=40)
+        )
+        found, _ = video.read("my.mp4")
+        assert found.shape[1:] == (84, 84, 3) and found.dtype == np.uint8
+        figures[f"{name}: frames"] = len(found)
+        figures[f"{name}: by frame"] = found.mean((1, 2, 3)).round(2)
+        figures[f"{name}: by place"] = found[3].reshape(6, 14, 6, 14, 3).mean((1, 3))[::2, :, 0]
+    golden(figures, atol=0.1)
+
+
+@pytest.mark.parametrize(("height", "width", "read"), [(84, 252, True), (83, 252, False)])
+def test_a_video_has_to_be_84_pixels_high(height, width, read, tmp_path):
+    frame = np.zeros((height, width, 3), np.uint8)
+    if read:
+        assert video._square(frame, "my.mp4").shape == (84, 84, 3)
+        return
+    with pytest.raises(InputError) as told:
+        video._square(frame, "my.mp4")
+    assert str(told.value) == (
+        "my.mp4: 252x83 pixels are too few; give a video of 84x84 or more, at most three times as "
+        "wide as high."
+    )
+
+
+def test_more_than_2000_frames_are_many():
+    """As long as a minute and twenty seconds is not, and the paper's videos are shorter."""
+    assert video.MAX_FRAMES == 80 * 25 and video.SIZE == 84
+
+
+def test_a_room_stays_where_87_of_100_frames_say_so(monkeypatch):
+    monkeypatch.setattr(video, "read_clip", lambda *_, **__: clip_of(film()))
+    for share, warned in ((0.869, True), (0.871, False)):
+        monkeypatch.setattr(video, "steadiness", lambda *_, share=share: share)
+        assert bool(video.read("my.mp4")[1]) is warned
+
+
+def test_steadiness_is_what_it_was(golden):
+    """Of a room that is shaken in some frames, with an arm before it; edges of many slopes."""
+    rng = np.random.default_rng(3)
+    room_ = cv2.GaussianBlur(rng.uniform(0, 255, (60, 84)).astype(np.float32), (0, 0), 4) * 3
+    frames = np.repeat(room_[None], 12, axis=0) + rng.normal(size=(12, 60, 84)).astype(np.float32)
+    figures = {"still": video.steadiness(frames, room_)}
+    for by, axis in ((1, 0), (2, 1), (3, 1)):
+        shaken_ = frames.copy()
+        shaken_[4:7] = np.roll(shaken_[4:7], by, axis)
+        shaken_[9, :, 30:] += 25
+        figures[f"{by} along {axis}"] = video.steadiness(shaken_, room_)
+    golden(figures)
+
+
+def test_a_film_is_written_for_browsers_with_enlarged_pixels(tmp_path, monkeypatch):
+    """VP9 by FFmpeg, the size that was asked for, blue first, each pixel as it is."""
+    asked, kept = [], []
+
+    class Writer:
+        opens = True
+
+        def __init__(self, *of):
+            asked.append(of[1:])
+            Path(of[0]).write_bytes(b"film")
+
+        def isOpened(self):
+            return self.opens
+
+        def write(self, frame):
+            kept.append(frame)
+
+        def release(self):
+            kept.append("released")
+
+        fourcc = staticmethod(lambda *letters: "".join(letters))
+
+    monkeypatch.setattr(video.cv2, "VideoWriter", Writer)
+    frames = np.arange(2 * 3 * 4 * 3, dtype=np.uint8).reshape(2, 3, 4, 3)
+    video.write(tmp_path / "a.mp4", frames, 12.5)
+    assert asked == [(cv2.CAP_FFMPEG, "vp09", 12.5, (8, 6))]
+    assert kept.pop() == "released" and (tmp_path / "a.mp4").read_bytes() == b"film"
+    for frame, given in zip(kept, frames, strict=True):
+        np.testing.assert_array_equal(frame, given[..., ::-1].repeat(2, 0).repeat(2, 1))
+    Writer.opens = False
+    with pytest.raises(RuntimeError) as told:
+        video.write(tmp_path / "b.mp4", frames, 25, scale=3)
+    assert str(told.value) == (
+        "this OpenCV cannot write VP9; install the version in requirements.txt."
+    )
+    assert asked[1][-1] == (12, 9) and not (tmp_path / "b.mp4").exists()
