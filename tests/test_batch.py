@@ -152,3 +152,88 @@ def test_where_all_methods_stand_as_in_the_paper_a_sentence_says_so():
         for task, n in zip(table.tasks.TASKS, some, strict=True)
     }
     assert table.order(runs) == "The methods stand in the paper's order on every task.\n"
+
+
+def test_every_run_is_asked_for_as_it_was(tmp_path, monkeypatch, golden):
+    """The arguments of each change, of a smoke run, and of one that goes on; and its memory."""
+    monkeypatch.chdir(tmp_path)
+    out, lines = batch.Path("out"), {}
+    for change in (*batch.ALONE, *batch.LATER):
+        words = batch.command(out, "push", 2, change, 7)
+        lines[change] = f"{batch.memory(change) / 1e9} {shlex.join(words)}"
+        assert batch.rests_on(change) in batch.ALONE
+    (out / "push-2").mkdir(parents=True)
+    (out / "push-2" / "settings.json").write_text("{}")
+    golden(
+        {
+            "lines": lines,
+            "on": shlex.join(batch.command(out, "push", 2, "", 7)),
+            "anew": shlex.join(batch.command(out, "push", 1, "literal", 7, fast=True)),
+            "alone": list(batch.ALONE),
+            "rests": [batch.rests_on(change) for change in (*batch.ALONE, *batch.LATER)],
+        }
+    )
+
+
+def test_what_is_missing_is_found_once_and_in_two_rounds(tmp_path):
+    """Finished is what has just as many episodes; what a run rests on is missing, too."""
+    for name, episodes in (("push-0", 3), ("push-0-literal", 2), ("reach-1-avid", 3)):
+        (tmp_path / name).mkdir()
+        metrics = {"episodes": [{}] * episodes, "stages": {}}
+        (tmp_path / name / "metrics.json").write_text(json.dumps(metrics))
+    (tmp_path / "push-1").mkdir()
+    (tmp_path / "push-1" / "metrics.json").write_text('{"stages": {}}')
+    wanted = [
+        ("push", 0, ""), ("push", 0, "literal"), ("push", 1, "wide"), ("push", 1, "timed"),
+        ("reach", 1, "avid-long"), ("reach", 0, "avid-5"), ("slide", 0, "tracks"),
+    ]  # fmt: skip
+    assert batch.missing(tmp_path, wanted, 3) == (
+        [("push", 1, ""), ("reach", 0, "avid"), ("slide", 0, "tracks")],
+        [wanted[1], wanted[2], wanted[3], wanted[4], wanted[5]],
+    )
+    assert not batch.finished(tmp_path / "nowhere", 0)
+
+
+def test_runs_are_started_logged_and_named_when_they_fail(tmp_path, monkeypatch, capsys):
+    """First those that stand alone, all of them before the others."""
+    started, out = [], tmp_path / "deep" / "out"
+
+    def run(line, stdout, stderr):
+        assert stdout is stderr and stdout.encoding == "utf-8"
+        stdout.write("ü\n")
+        started.append((line[0], line[1:3], line[3], line[-1], stdout.name))
+        return type("Done", (), {"returncode": 4 * (line[3] == "slide")})
+
+    monkeypatch.setattr(batch.subprocess, "run", run)
+    monkeypatch.setattr(batch.sys, "executable", "py")
+    batch.run_missing(out, [("push", 0, "literal")], 1, 5, fast=True)
+    batch.run_missing(out, [("push", 0, "")], 1, 5)
+    assert started == [
+        ("py", ["-m", "tasks"], "push", "--fast", str(out / "push-0.log")),
+        ("py", ["-m", "tasks"], "push", "--fast", str(out / "push-0-literal.log")),
+        ("py", ["-m", "tasks"], "push", "--from-scratch", str(out / "push-0.log")),
+    ]
+    assert (out / "push-0.log").read_text(encoding="utf-8") == "ü\nü\n"
+    assert capsys.readouterr().out.splitlines()[0] == (
+        f"running push-0; {out / 'push-0'}.log tells how far it is"
+    )
+    with pytest.raises(InputError) as told:
+        batch.run_missing(out, [("slide", 3, "avid")], 2, 5)
+    path = out / "slide-3-avid"
+    assert str(told.value) == f"{path}: the run ended with code 4; see {path}.log."
+
+
+def test_a_finished_run_is_read_as_a_row(tmp_path):
+    episodes = [{"success": s, "success_at_end": e} for s, e in ((1, 1), (1, 0), (0, 0))]
+    metrics = {
+        "episodes": episodes, "stages": {"policy": 5}, "settings": {"recipe": {"policy_steps": 9}},
+    }  # fmt: skip
+    row = {"task": "push", "seed": 4, "wins": 2, "wins_at_end": 1, "episodes": 3,
+           "stages": {"policy": 5}, "steps": 9}  # fmt: skip
+    for change, more in (("", {}), ("avid", {"memory_mb": 7, "perception": {"robot": 1}})):
+        path = batch.folder(tmp_path, "push", 4, change)
+        path.mkdir()
+        (path / "metrics.json").write_text(json.dumps(metrics | more))
+        none = {"memory_mb": None, "perception": None}
+        named = {"change": change or "mended"}
+        assert batch.read(tmp_path, "push", 4, change) == row | named | none | more

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import gymnasium as gym
 import numpy as np
 import pytest
+from digests import options
 
 import tasks
 from lbw_minimal import classifier, rivals, sac, sac_ae
@@ -264,3 +265,129 @@ def test_the_tables_in_the_results_are_those_of_the_measurements():
     assert notes and all(note["episodes"] == 100 for note in notes)
     text = (results / "README.md").read_text()
     assert all(controls.table(note) in text for note in notes)
+
+
+def test_robots_notes_and_tables_are_what_they_were(golden):
+    """Arguments, jitters and names; what robots do; the tables of made-up measurements."""
+    robots = {
+        "replay": controls.replay(np.arange(6, dtype=np.float32).reshape(2, 3)),
+        "constant": controls.constant((1, 0.5, -1)),
+        "down": controls.down_then_along(3),
+        "noise": controls.noise(),
+        "other noise": controls.noise(4),
+        "look": controls.look_once(
+            np.array([[0.0, 0], [3, 4], [0, 5]]),
+            [np.full((3, 3), k, np.float32) for k in range(3)],
+        ),
+    }
+    seen = [[2.0, 3.9], [0.0, 0.1], [0.0, 9.0], [9.0, 0.0], [3.0, 4.0]]
+    acts = {
+        name: [robot(np.array(obs), t) for t, obs in enumerate(seen)]
+        for name, robot in robots.items()
+    }
+    names = ("the policy", *controls.BLIND)
+    notes = [
+        {
+            "task": task, "episodes": n,
+            "success": {
+                str(jitter): {name: (3 * k + i + 7 * (name == "the policy") + j) % (n + 1)
+                              for k, name in enumerate(names)}
+                for i, jitter in enumerate((0.005, 0.04))
+            },
+        }
+        for j, (task, n) in enumerate((("push", 20), ("reach", 9)))
+    ]  # fmt: skip
+    kinds = {str(a[0].dtype) for a in acts.values()}
+    golden(
+        {name: np.array(a).round(5) for name, a in acts.items()}
+        | {
+            "kinds": sorted(kinds),
+            "table": controls.table(notes[0]).splitlines(),
+            "beside": controls.side_by_side(notes, 0.04).splitlines(),
+            "pay": controls.eyes_pay(notes).splitlines(),
+            "share": [controls.share(0, 3), controls.share(99, 100)],
+            "options": list(options(controls.parser())),
+            "says": controls.parser().description,
+            "numbers": [*controls.JITTERS, controls.TRIAL_SEED, controls.TRIALS, controls.LIBRARY],
+            "blind": list(controls.BLIND),
+        }
+    )
+
+
+@pytest.mark.parametrize(
+    ("ends", "whole", "steps"),
+    [("terminated", True, 3), ("truncated", True, 3), ("terminated", False, 2), (None, False, 2)],
+)
+def test_an_episode_is_over_when_its_task_says_so_or_when_it_is_done(ends, whole, steps):
+    """Done with the second step and not with the third; the returns of all steps add up."""
+
+    class Env(gym.Env):
+        def reset(self, *, seed=None, options=None):
+            assert seed == 77
+            self.t = 0
+            return np.array([5.0]), {}
+
+        def step(self, action):
+            assert action.tolist() == [self.t] * 3  # the step of the episode
+            self.t += 1
+            over = self.t == 3
+            return (
+                np.array([5.0 + self.t]), 10.0**self.t, over and ends == "terminated",
+                over and ends == "truncated", {"is_success": self.t == 2},
+            )  # fmt: skip
+
+    seen = []
+
+    def robot(obs, t):
+        seen.append(obs[0])
+        return np.full(3, t)
+
+    done, total, first, actions = controls.play(Env(), robot, 77, whole)
+    assert done and total == sum(10.0**k for k in range(1, steps + 1)) and first.tolist() == [5]
+    assert len(actions) == steps and seen == [5.0 + k for k in range(steps)]
+
+
+def test_a_frozen_camera_takes_one_picture_an_episode_and_a_grey_one_none():
+    frozen = controls.Frozen(tasks.gym.make("LbW-Push-v0", jitter=0.04))
+    firsts = []
+    for seed in (0, 1):
+        first, info = frozen.reset(seed=seed)
+        assert info["is_success"] is False
+        firsts.append(first)
+        for _ in range(3):
+            later, *_ = frozen.step(np.array([1.0, 0, -1]))
+            np.testing.assert_array_equal(later, first)
+            later[:] = 0  # whoever writes into a picture writes into a copy
+    assert (firsts[0] != firsts[1]).any() and firsts[1].any()
+    frozen.close()
+    grey = controls.Grey(tasks.gym.make("LbW-Push-v0"))
+    for picture in (grey.reset(seed=0)[0], grey.step(np.zeros(3))[0]):
+        assert picture.shape == (84, 84, 3) and picture.dtype == np.uint8
+        assert (picture == 128).all()
+        picture[:] = 0
+    grey.close()
+
+
+def test_measures_are_of_what_was_asked_and_a_smoke_run_of_few(monkeypatch):
+    asked = []
+    monkeypatch.setattr(controls, "compare", lambda *a, **k: asked.append((a, k)) or {"idle": 1})
+    note = controls.measure("push", "w", 9, 4, {"b": 1}, (0.01, 0.02), brief=True)
+    assert note == {
+        "task": "push", "episodes": 9, "seed": 4,
+        "success": {"0.01": {"idle": 1}, "0.02": {"idle": 1}},
+    }  # fmt: skip
+    few = {"library": 2, "trials": 1}
+    assert asked == [(("push", "w", j, 9, 4, {"b": 1}), few) for j in (0.01, 0.02)]
+    controls.measure("push", "w", 9, 4, {})
+    assert [a[2] for a, k in asked[2:]] == [0.005, 0.01, 0.02, 0.04] and asked[2][1] == {}
+
+
+def test_a_run_beside_is_known_by_its_settings(tmp_path):
+    with pytest.raises(InputError) as told:
+        controls.method_of(tmp_path)  # nothing is noted: LbW's own
+    assert str(told.value) == f"--beside {tmp_path}: no run of a rival is there."
+    for method, name in (("avid", "AVID-m"), ("classifier", "Classifier reward"),
+                         ("tracks", "Object tracks")):  # fmt: skip
+        (tmp_path / "settings.json").write_text(json.dumps({"method": method, "seed": 2}))
+        assert controls.method_of(tmp_path) == name
+    assert controls.settings(tmp_path) == {"method": "tracks", "seed": 2}

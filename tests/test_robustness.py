@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from digests import options
 
 import tasks
 from tasks.commands import JITTER, robustness
@@ -51,3 +52,56 @@ def test_a_blue_object_is_blue_and_the_rest_as_it_was(seen):
     assert 20 < changed.sum() < 200
     assert (blue[changed][:, 2] > blue[changed][:, 0]).mean() > 0.8
     assert (plain[changed][:, 0] > plain[changed][:, 2]).mean() > 0.8
+
+
+def test_changes_of_a_picture_are_what_they_were(golden):
+    """Of a picture that is lighter to the right and down, higher than wide, bright at a place."""
+    frame = np.arange(6)[:, None, None] * 30 + np.arange(4)[:, None] * 12 + np.array([0, 5, 40])
+    frame[2, 1] = 250
+    given = frame.astype(np.uint8)
+    changes = {name: change(given) for name, change in robustness.CHANGES.items()}
+    changes |= {str(by): robustness.moved(*by)(given) for by in ((1, 2), (-3, -1))}
+    changes |= {str(gain): robustness.brighter(gain)(given) for gain in (0.33, 1.7)}
+    assert all(change.dtype == np.uint8 for change in changes.values())
+    np.testing.assert_array_equal(given, frame)  # what was given stays
+    golden(
+        {name: change.transpose(2, 0, 1)[::2, ::2] for name, change in changes.items()}
+        | {
+            "options": list(options(robustness.parser())),
+            "says": robustness.parser().description,
+            "blue": robustness.BLUE,
+        }
+    )
+
+
+def test_all_parts_of_a_colour_are_painted_and_counted():
+    """A mug and its handle are four parts, in the robot's world; green and grey stay."""
+    env = tasks.bare("coffee", observation="state")
+    p = env.world.p
+
+    def colours():
+        shapes = [s for i in range(p.getNumBodies()) for s in p.getVisualShapeData(i)]
+        return np.array([s[7] for s in shapes])
+
+    before = colours()
+    assert robustness.paint(env.world, (0.3, 0.9, 0.1, 1), (0, 0, 1, 1)) == 0
+    assert robustness.paint(env.world, robustness.RED, robustness.BLUE) == 4
+    changed = (before != colours()).any(1)
+    assert changed.sum() == 4 and np.allclose(before[changed], robustness.RED, atol=0.01)
+    np.testing.assert_allclose(colours()[changed], [robustness.BLUE] * 4, atol=1e-6)
+    assert robustness.paint(env.world, np.add(robustness.BLUE, 0.009), (0, 0, 0, 1)) == 4
+    assert robustness.paint(env.world, (0.012, 0, 0, 1), (1, 1, 1, 1)) == 0  # farther than 0.01
+    env.close()
+
+
+def test_what_came_of_each_change_is_a_row_with_its_interval(monkeypatch, capsys, tmp_path):
+    asked = []
+    monkeypatch.setattr(
+        robustness, "robustness", lambda *of: asked.append(of) or {"as trained": 7, "darker": 0}
+    )
+    robustness.main(["push", "--episodes", "8", "--seed", "3", "--weights", str(tmp_path)])
+    assert asked == [("push", tmp_path, 8, 3)]
+    assert capsys.readouterr().out == (
+        "| push | success | 95 % interval |\n| --- | --- | --- |\n"
+        "| as trained | 7/8 | 53-98 % |\n| darker | 0/8 | 0-32 % |\n"
+    )

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from digests import options
 
 from lbw_minimal.report import wilson
 from lbw_minimal.reward import MENDS
@@ -290,3 +291,86 @@ def test_runs_with_moved_starts_are_as_good_as_their_table_says():
         lines.append([task, f"{wins}/{n}", f"{low}-{high} %"])
     text = table.markdown(["task", "success", "95 % interval"], lines)
     assert text in (RESULTS / "README.md").read_text()
+
+
+def some_runs():
+    """Runs of two tasks by every method, in numbers that differ everywhere."""
+    n, runs = 0, {}
+    for task in ("push", "slide"):
+        for change, seeds in (
+            ("", 3),
+            ("literal", 3),
+            ("classifier", 2),
+            ("avid", 2),
+            ("tracks", 3),
+        ):
+            rows = []
+            for seed in range(seeds):
+                n += 1
+                scores = {
+                    name: {"r2": None if name == "object_y" else 0.9 - 0.01 * n - 0.05 * k}
+                    for k, name in enumerate(("tip_x", "tip_y", "object_x", "object_y"))
+                }
+                other = {k: {"r2": v["r2"] and v["r2"] / 2} for k, v in scores.items()}
+                rows.append({
+                    "task": task, "seed": seed, "change": change, "wins": (7 * n) % 11,
+                    "episodes": 10 + n % 3, "stages": {"a": 100.0 * n, "b": 7.0 * n * n},
+                    "steps": 1000 * n, "perception": {"robot": scores, "translated": other},
+                })  # fmt: skip
+            runs[task, change] = rows
+    return runs
+
+
+def test_tables_of_some_runs_read_as_they_did(tmp_path, monkeypatch, golden):
+    """All tables of the page, the file of rows, and which runs are asked for in which order."""
+    runs, asked, read = some_runs(), [], []
+    monkeypatch.setattr("tasks.TASKS", ("push", "slide"))
+    monkeypatch.setattr(table, "run_missing", lambda *how: asked.append(how))
+    monkeypatch.setattr(
+        table, "read", lambda out, t, s, c: read.append((out, t, s, c)) or runs[t, c][s]
+    )
+    figures = {}
+    for kind, how in {"plain": {}, "tracks": {"tracks": True}, "all": {
+        "tracks": True, "rivals": True, "ray": True,
+    }}.items():  # fmt: skip
+        text = table.table(tmp_path, 4, 11, 3 if kind != "tracks" else 1, **how)
+        assert (tmp_path / "table.md").read_text() == text
+        figures[kind] = text.splitlines()
+    plain = figures.pop("plain")
+    assert figures["all"][: len(plain)] == plain
+    assert [how[0] for how in asked] == [tmp_path] * 3
+    assert [how[2:] for how in asked] == [(4, 11, False), (4, 11, False), (4, 11, True)]
+    rows = json.loads((tmp_path / "table.json").read_text())
+    figures["rows"] = [f"{r['task']} {r['change']} {r['seed']}" for r in rows]
+    figures["wanted"] = [" ".join(map(str, job)) for job in asked[2][1]]
+    assert (tmp_path / "table.json").read_text().endswith("}\n]\n") and read[0][0] == tmp_path
+    golden(figures)
+
+
+def test_the_paper_and_the_arguments_are_what_they_were(golden):
+    golden(
+        {
+            "table": list(options(table.parser())),
+            "ablation": [p.description for p in map(table.parser, ("table", "ablation"))],
+            "count": len(list(options(table.parser("ablation")))),
+            "paper": {k: str(v) for k, v in table.TABLE_II.items()},
+            "methods": {k: str(v) for k, v in table.METHODS.items()},
+            "head": table.HEAD,
+            "seeds": [table.SEEDS, table.RIVAL_SEEDS],
+            "counts": [str(table.counts(5, *on)) for on in ((0, 0), (1, 0), (0, 1), (1, 1))],
+            "one": str(table.counts(1, True, True)),
+        }
+    )
+
+
+def test_rates_and_times_by_hand():
+    """7 of 8 and 1 of 12, 90 minutes and 18, of a task that is not the paper's."""
+    rows = [{"wins": 7, "episodes": 8, "stages": {"a": 5400}, "steps": 1234},
+            {"wins": 1, "episodes": 12, "stages": {"a": 900, "b": 180}, "steps": 9}]  # fmt: skip
+    assert table.rate(rows) == (0.4, *wilson(8, 20))
+    assert table.percent(rows) == "40 % (22-61)"
+    assert table.each(rows) == "7/8, 1/12" and table.hours(rows) == "1.8 h"
+    assert table.success("domino", rows, rows[:1]) == [
+        "domino", "-", "40 % (22-61)", "7/8, 1/12", "88 % (53-98)", "7/8", "54 min", "1,234",
+    ]  # fmt: skip
+    assert table.markdown(["a", "b"], [["1", "2"]]) == "| a | b |\n| --- | --- |\n| 1 | 2 |\n"
