@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from digests import options
 
 import tasks
 from lbw_minimal.imitate import Recipe
@@ -228,3 +229,156 @@ def test_what_is_random_is_read_whole_where_a_translation_learns_and_joined_by_f
     weights = ["--weights", str(tmp_path / "there")]
     assert random("--method", "avid", "--evaluate", *weights) == []
     assert random("--method", "classifier") == []
+
+
+def refused(name, *argv):
+    """What a command line is refused with, or "-"; nothing is looked at but the options."""
+    args = job.parser(name).read([*argv])
+    lbw = args.method == "lbw"
+    try:
+        job.refuse_idle_options(
+            args, lbw and (args.from_scratch or args.fast or args.translate_clip)
+        )
+    except InputError as error:
+        return str(error)
+    return "-"
+
+
+def test_what_does_nothing_beside_the_other_options_is_refused_as_it_was(golden):
+    """Each option beside each method, to train and to replay, and pairs of options."""
+    methods = {
+        "lbw": (), "scratch": ("--from-scratch",), "fast": ("--fast",),
+        "replay": ("--evaluate",),
+        "replay tracks": ("--evaluate", "--method", "tracks", "--weights", "w"),
+        "replay avid": ("--evaluate", "--method", "avid", "--weights", "w"),
+        "avid": ("--method", "avid"), "classifier": ("--method", "classifier"),
+        "tracks": ("--method", "tracks"), "clip": ("--video", "my.mp4"),
+        "literal": ("--reward", "literal"),
+        "blind replay": ("--evaluate", "--method", "classifier"),
+    }  # fmt: skip
+    options = (
+        ("--videos", "1"), ("--videos", "2"), ("--from-scratch",), ("--without", "trim"),
+        ("--reward", "literal"), ("--set", "K=3", "--set", "hue=2"),
+        ("--weights", "w"), ("--fast",),
+        ("--device", "cpu"), ("--video", "a.mp4"), ("--translate-clip",), ("--resume",),
+        ("--video", "a.mp4", "--translate-clip"), ("--video", "a.mp4", "--videos", "1"),
+    )  # fmt: skip
+    said = {}  # each sentence once; which, for each pair, by number
+    table = {
+        name: [said.setdefault(refused("push", *argv, *option), len(said)) for option in options]
+        for name, argv in methods.items()
+    }
+    golden(table | {"said": list(said)})
+
+
+def test_the_arguments_of_a_run_are_what_they_were(golden):
+    parser = job.parser("slide")
+    golden(
+        {
+            "options": list(options(parser)),
+            "says": [parser.description, parser.prog],
+            "help": [a.help for a in parser._actions if a.dest in ("out", "episodes", "videos")],
+            "episodes": job.TEST_EPISODES,
+            "results": list(job.RESULTS),
+        }
+    )
+
+
+@pytest.mark.parametrize(
+    ("argv", "read", "trained", "recipe"),
+    [
+        ([], ["expert_01.mp4"], True, 3000),
+        (["--from-scratch"], ["expert_01.mp4", "random.mp4 whole"], False, 3000),
+        (["--fast"], ["expert_01.mp4", "random.mp4 whole"], False, 800),
+        (["--evaluate"], ["expert_01.mp4"], True, 3000),
+        (["--video", "my.mp4", "--translate-clip"], ["my.mp4"], False, 3000),
+        (["--method", "classifier"], [], False, 3000),
+        (["--method", "tracks"], ["expert_01.mp4"], False, 3000),
+    ],
+)
+def test_what_a_run_reads_and_loads_is_what_it_learns_from(
+    argv, read, trained, recipe, tmp_path, monkeypatch
+):
+    """And the threads and the machine that are noted."""
+    seen, watched, threads, checked = [], [], [], []
+
+    def read_video(path, whole=False):
+        seen.append(path.name + " whole" * whole)
+        return np.full((2 + whole, 84, 84, 3), len(seen), np.uint8)
+
+    monkeypatch.setattr(job, "read_video", read_video)
+    monkeypatch.setattr(job.tracks, "watch", watched.append)
+    monkeypatch.setattr(job, "load_perception", lambda folder, name: (folder.name, name))
+    monkeypatch.setattr(job, "check_weights", lambda *what: checked.append(what))
+    monkeypatch.setattr(job.torch, "set_num_threads", threads.append)
+    monkeypatch.setattr(job.os, "cpu_count", lambda: 6)
+    monkeypatch.setattr(job.platform, "machine", lambda: "toy")
+    line = [*argv, "--out", str(tmp_path / "out"), "--seed", "5"]
+    made = job.check("push", job.parser("push").read(line), line)
+    assert seen == read and threads == [6] and made.recipe.policy_steps == recipe
+    assert made.trained == (("push", "push") if trained else None)
+    assert len(watched) == ("tracks" in argv) and made.weights == tasks.WEIGHTS / "push"
+    assert len(made.random) == 3 * ("random.mp4 whole" in read) and made.random.shape[1:] == (
+        84,
+        84,
+        3,
+    )
+    assert made.from_scratch is (not trained and "--method" not in argv)
+    assert made.run.metrics["machine"] == f"toy, 6 cores, torch {job.torch.__version__}"
+    assert made.run.metrics["version"] == job.__version__ and "clip" not in made.run.metrics
+    assert made.run.metrics["command"] == made.command and made.name == "push"
+    assert made.run.metrics["settings"]["seed"] == 5 and made.run.out == tmp_path / "out"
+    assert checked == [(tasks.WEIGHTS / "push", "push", "lbw")] * ("--evaluate" in argv)
+
+
+def test_weights_are_not_cleared_by_the_run_that_takes_them(tmp_path, monkeypatch):
+    monkeypatch.setattr(job, "read_video", lambda path, whole=False: np.zeros((2, 84, 84, 3)))
+    line = ["--weights", str(tmp_path / "a" / ".." / "b"), "--out", str(tmp_path / "b")]
+    (tmp_path / "a").mkdir()
+    with pytest.raises(InputError) as told:
+        job.check("push", job.parser("push").read(line), line)
+    assert str(told.value) == (
+        f"{tmp_path / 'b'}: the run would clear it of the weights; give another --out."
+    )
+
+
+def test_a_persons_clip_is_made_usable_and_noted(tmp_path, monkeypatch):
+    """The translation of AVID is looked at before a run takes it."""
+    film, loaded, asked = np.ones((4, 84, 84, 3), np.uint8), [], []
+    clip = SimpleNamespace(film=film)
+    monkeypatch.setattr(job, "usable", lambda *what: asked.append(what) or clip)
+    monkeypatch.setattr(job, "bring", lambda *what: what)
+    monkeypatch.setattr(job, "load_perception", lambda folder, name: None)
+    line = ["--video", "my.mp4", "--out", str(tmp_path / "c")]
+    made = job.check("push", job.parser("push").read(line), line)
+    mine = job.Path("my.mp4")
+    assert asked == [("push", mine)] and made.demo is film
+    assert made.run.metrics["clip"] == (tmp_path / "c", "push", clip, mine)
+    monkeypatch.setattr(job, "read_video", lambda path, whole=False: film)
+    monkeypatch.setattr(job.cyclegan, "load", lambda *what: loaded.append(what))
+    line = ["--method", "avid", "--weights", "w", "--out", str(tmp_path / "d")]
+    job.check("push", job.parser("push").read(line), line)
+    assert loaded == [(job.Path("w") / "translation.safetensors", "push")]
+
+
+def test_a_folder_that_cannot_be_gone_on_with_is_named(tmp_path, monkeypatch):
+    said = []
+    for settings in ({"a": 1}, {"a": 2}):
+        with pytest.raises(InputError) as told:
+            prepare_folder(tmp_path, settings, resume=True)
+        said.append(str(told.value))
+        (tmp_path / "settings.json").write_text('{"a": 1}')
+    assert said == [
+        f"{tmp_path}: there is no run to resume here; start it without --resume.",
+        f"{tmp_path}: that run had other settings; give those, or another --out.",
+    ]
+
+    def full(path, text):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(job, "write_atomic", full)
+    with pytest.raises(InputError) as told:
+        prepare_folder(tmp_path, {"a": 3}, resume=False)
+    assert str(told.value) == (
+        f"{tmp_path}: cannot write there (No space left on device); give another --out."
+    )

@@ -240,3 +240,95 @@ def test_a_push_that_fails_is_done_again_at_two_thirds_of_the_pace(monkeypatch):
     monkeypatch.setattr(module, "_measured_push", lambda env, motion: (0.009, True))
     done = reenact(Table(SCENE), motion)
     assert done.motion is motion and not done.notes + done.warnings
+
+
+def slides(scale, power=2.0, most=9.0):
+    """How far a thing goes of its way of 1 with a hit so many times as fast."""
+    return lambda factor: ended(min(scale * factor**power, most), start=0.0, goal=1.0)
+
+
+def test_hits_and_pushes_are_tried_as_they_were(monkeypatch, golden):
+    """The guesses in their order, what is taken, and what is said of it; by seven tables."""
+    figures = {}
+    for name, end in {
+        "weak": slides(0.3), "strong": slides(5.0), "steep": slides(0.02, 5.0),
+        "never": slides(1e-4), "always": slides(40.0, 0.1), "exact": slides(0.995),
+        "odd": slides(0.42, 1.0),
+    }.items():  # fmt: skip
+        asked, notes, warnings = rehearsing(monkeypatch, end), [], []
+        taken = module._timed_hit(None, None, notes, warnings)
+        figures[f"hit {name}"] = [*asked, taken]
+        figures[f"hit {name}: said"] = notes + warnings
+    for name, (give, done) in {
+        "soon": (1.0, True), "slow": (0.6, True), "over": (1.8, True), "no nearer": (0.05, True),
+        "undone": (0.5, False),
+    }.items():  # fmt: skip
+
+        def end(further, give=give, done=done):
+            return ended(0.9 + give * further, done=done or further > 0.12)
+
+        asked = rehearsing(monkeypatch, end)
+        further, success = module._measured_push(None, None)
+        figures[f"push {name}"] = [*asked, further, success]
+    golden(figures)
+
+
+def test_a_motion_is_led_and_hurried_as_it_was(golden):
+    """Contact in the middle, arrival before the end; a run-up that creeps, a hand that recoils."""
+    rng = np.random.default_rng(0)
+    x = np.cumsum(np.r_[0, 0.001, 0, rng.uniform(0.005, 0.06, 9), -0.01, -0.02, 0.0, 0.0])
+    tip = np.stack([0.45 + x, 0.08 + 0.02 * np.sin(np.arange(len(x)))], 1)
+    times = np.arange(len(x)) / 25
+    motion = Motion(tip, tip, times, 5, 11, np.eye(2, 3), False)
+    figures = {}
+    for name, scene in (("push", SCENE), ("hit", HIT)):
+        env = Table(scene)
+        env.STEP, rows = 0.08, []
+        for action in commands(env, motion, further=0.05):
+            assert action.dtype == np.float32
+            env.arm.goal = env.arm.goal + 0.9 * env.STEP * action
+            rows.append([*action])
+        figures[name] = np.round(rows[:16], 4)
+        figures[f"{name}: steps"] = len(rows)
+    for factor in (0.4, 1.0, 1.7):
+        fast = module._faster(motion, factor)
+        figures[f"{factor}"] = [len(fast.tip), *fast.tip[::4, 0], *fast.tip[-1]]
+    constants = "TRIES", "SWINGS", "CLOSE", "COAST", "ODD", "SLOWER"
+    figures["numbers"] = [*(getattr(module, name) for name in constants), *module.SPEEDS]
+    golden(figures, atol=1e-4)
+
+
+@pytest.mark.parametrize("name", ["push", "coffee", "drawer"])
+def test_a_persons_push_is_done_again_as_it_was(name, golden):
+    """A quick one with a hand that stops too soon; how it goes hangs on contact."""
+    env, motion = laid(name, fps=25, speed=1.1)
+    env.reset(seed=0)
+    x = motion.tip[:, 0]
+    short = np.stack([x - 0.012 * (x - x[0]) / (x[-1] - x[0]), motion.tip[:, 1]], 1)
+    done = reenact(env, replace(motion, tip=short))
+    golden(
+        {
+            "steps": len(done.recording.actions),
+            "frames": len(done.frames) - len(done.recording.states),
+            "seed": done.recording.seed,
+            "way": done.recording.states[::12, [0, 2, 3]].round(3),
+            "warnings": len(done.warnings),
+            "notes": len(done.notes),
+            "done": bool(done.recording.success[-1]),
+        },
+        rtol=0,
+        atol=5e-3,
+    )
+    env.close()
+
+
+def test_what_is_not_done_at_the_end_is_told_by_how_far(monkeypatch):
+    states = np.zeros((2, 9))
+    states[-1, 3:6], states[-1, 6:9] = (0.5, 0.1, 0), (0.62, 0, 0.1)
+    failed = Recording(0, False, None, states, None, np.array([True, False]))
+    monkeypatch.setattr(module, "_measured_push", lambda env, motion: (0.02, True))
+    monkeypatch.setattr(module, "film", lambda env, seed, actions: (None, None, failed))
+    with pytest.raises(Unusable) as told:
+        reenact(Table(SCENE), along(0, 1, 2))
+    assert "the motion ends 19 cm from the goal" in str(told.value)
+    assert "film one steady motion from the start to the goal" in f"{told.value} {vars(told.value)}"
