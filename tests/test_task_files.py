@@ -1,7 +1,8 @@
 """The task files compute what they computed when the shipped results were made."""
 
-import dataclasses
 import functools
+import sys
+from types import SimpleNamespace
 
 import gymnasium as gym
 import numpy as np
@@ -9,6 +10,10 @@ import pytest
 from digests import digest
 
 import tasks
+from lbw_minimal.imitate import Recipe
+from lbw_minimal.training import InputError
+from tasks import __main__ as kit
+from tasks import needs
 from tasks.world import expert_actions, film, random_takes
 
 ARMS = ("robot", "human")
@@ -61,14 +66,14 @@ def test_the_scene_is_built_as_it_was(name, make, golden):
 
 @every_task
 def test_the_scene_looks_as_it_did(name, make, golden):
-    """Means of 7 x 7 fields of a picture, of the start and of a step later."""
+    """Means of 6 x 6 fields of a picture, of the start and of a step later."""
     figures = {}
     for arm in ARMS:
         env = make(name, arm)
         env.reset(seed=1)
         env.step(np.array([1.0, 0, -1]))
         picture = env.world.render()
-        figures[arm] = picture.reshape(7, 12, 7, 12, 3).mean((1, 3)).round(1)
+        figures[arm] = picture.reshape(6, 14, 6, 14, 3).mean((1, 3)).round(1)
         figures[f"{arm}'s edges"] = digest(np.abs(np.diff(picture.astype(float), axis=1)))
         figures[f"{arm}'s places"] = env.true_pixels()
     golden(figures, atol=0.1)
@@ -82,7 +87,7 @@ def test_starts_are_drawn_as_they_were(name, golden):
         env = tasks.bare(name, embodiment=arm, observation="state", jitter=0.05)
         jittered = [env.reset(seed=seed)[0][:6] for seed in range(4)]
         options = {"scatter": True}
-        anywhere = [env.reset(seed=seed, options=options)[0][[0, 2, 3]] for seed in range(20)]
+        anywhere = [env.reset(seed=seed, options=options)[0][[0, 2, 3]] for seed in range(16)]
         figures[f"{arm}, moved"] = short(jittered)
         figures[f"{arm}, anywhere"] = short(anywhere)
         figures[f"{arm}, drawn next"] = env.np_random.random()
@@ -174,7 +179,7 @@ def test_a_task_states_what_it_stated(name, make, golden):
     stated = (env.STEP, env.KP, env.OVERSPEED, env.PUSH_AT, env.CONTACT or -1, module.HORIZON)
     golden(
         {
-            "recipe": {k: str(v) for k, v in dataclasses.asdict(recipe).items()},
+            "recipe": {k: str(v) for k, v in vars(recipe).items() if v != vars(Recipe(0, 0))[k]},
             "scene": {k: str(np.round(v, 6)) for k, v in vars(scene).items() if v is not None},
             "stated": flat([*stated, env.LEASH, env.WORKSPACE, env.START, *env.CAMERA]),
             "target": env.target_position(),
@@ -222,4 +227,97 @@ def test_a_drawer_is_shut_from_31_5_millimetres():
     for q, done in ((-0.032, False), (-0.0314, True), (0.0, True)):
         env.world.p.resetJointState(env.drawer, 0, q)
         assert env.is_success() is done
+    env.close()
+
+
+# The package and its command line -----------------------------------------------------------------
+
+
+def test_the_package_names_what_it_named(golden):
+    root = tasks.ROOT
+    golden(
+        {
+            "tasks": list(tasks.TASKS),
+            "experts": tasks.ROBOT_EXPERTS,
+            "folders": [p.relative_to(root).as_posix() for p in (tasks.VIDEOS, tasks.WEIGHTS)],
+            "root": (root / "pyproject.toml").exists(),
+            "ids": [tasks.id_of(name) for name in ("push", "pour_tea")],
+            "needs": list(needs.NEEDS),
+            "overview": kit.overview().splitlines(),
+        }
+    )
+
+
+def test_a_command_line_goes_to_its_task_or_command_and_says_how_it_ended(monkeypatch, capsys):
+    """What remains of it goes along; a mistake is a sentence on stderr, and 2."""
+    told = []
+
+    class Module:
+        def __init__(self, name):
+            self.name = name
+
+        def main(self, *given):
+            told.append((self.name, *given))
+            if given[-1] == ["--bad"]:
+                raise InputError("a mistake.")
+            return 5 if given[-1] == ["--five"] else None
+
+    monkeypatch.setattr(kit, "import_module", Module)
+    monkeypatch.setattr(sys, "argv", ["tasks", "push", "--fast"])
+    codes = [kit.main(), kit.main(["coffee", "--five"]), kit.main(["table"])]
+    codes += [
+        kit.main(["table", "--five"]),
+        kit.main(["reach", "--bad"]),
+        kit.main(["eyes", "--bad"]),
+    ]
+    assert codes == [0, 0, 0, 5, 2, 2]
+    assert told == [
+        ("tasks.commands.run", "push", ["--fast"]), ("tasks.commands.run", "coffee", ["--five"]),
+        ("tasks.commands.table", []), ("tasks.commands.table", ["--five"]),
+        ("tasks.commands.run", "reach", ["--bad"]), ("tasks.commands.eyes", ["--bad"]),
+    ]  # fmt: skip
+    assert capsys.readouterr() == ("", "error: a mistake.\nerror: a mistake.\n")
+    assert kit.main(["pull"]) == 2
+    there = ", ".join((*tasks.TASKS, *kit.COMMANDS))
+    assert capsys.readouterr().err == (
+        f"error: pull: there is no such task or command; choose one of {there}.\n"
+    )
+    for asked in (["-h"], ["--help", "push"], []):
+        assert kit.main(asked) == 0
+        assert capsys.readouterr().out == kit.overview() + "\n"
+
+
+def test_what_a_task_lacks_is_said_or_left_empty(monkeypatch):
+    """A file without words has no sentence; a scene of an own camera closes; a name is needed."""
+    module = type("Module", (), {"__doc__": "One\n  line. \n\nAnother."})
+    monkeypatch.setattr(tasks, "module", lambda name: module)
+    assert tasks.sentence("x") == "One line."
+    module.__doc__ = None
+    assert tasks.sentence("x") == ""
+    module.Pour = type("Pour", (), {"GOAL": "", "CONTACT": 0.0})
+    assert tasks.goal("pour") == "" and tasks.moves_object("pour") is True
+    with pytest.raises(InputError) as told:
+        tasks.keypoint_env("pour")
+    assert str(told.value) == (
+        "pour: there is no such task; choose one of reach, push, slide, coffee, drawer."
+    )
+
+
+def test_experts_are_counted_by_their_name_and_filmed_with_the_jitter(monkeypatch):
+    asked = []
+    monkeypatch.setattr(tasks, "counted", lambda things, *of: asked.append(of) or things)
+    monkeypatch.setattr("tasks.world.expert_takes", lambda env, n: [(n, "pixels", env.jitter)])
+    assert list(tasks.robot_experts("push", 0.02)) == [(35, 0.02)]
+    assert asked == [(35, "robot experts")]
+
+
+def test_an_environment_of_an_own_reward_is_the_tasks(monkeypatch):
+    """Its arguments go along, whatever pays."""
+    monkeypatch.setattr(
+        "lbw_minimal.imitate.load_perception",
+        lambda folder, name: SimpleNamespace(detect=lambda frames: np.zeros((len(frames), 5, 2))),
+    )
+    env = tasks.keypoint_env("reach", None, jitter=0.02, embodiment="human")
+    assert (env.unwrapped.jitter, env.unwrapped.embodiment) == (0.02, "human")
+    assert env.reset(seed=0)[0].shape == (10,) and env.spec.max_episode_steps == 50
     env.close()
