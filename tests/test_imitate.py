@@ -334,3 +334,11 @@ def test_a_policy_is_what_it_became(tmp_path, golden):
         rtol=1e-2,
         atol=1e-4,
     )
+
+
+def test_the_time_of_a_stage_is_noted_in_tenths_of_a_second(tmp_path):
+    run = Run(tmp_path)
+    with run.stage("policy") as checkpoint:
+        checkpoint._start -= 12.34567
+    spent = run.metrics["stages"]["policy"]
+    assert spent == round(spent, 1) == pytest.approx(12.3, abs=0.2)
