@@ -288,6 +288,11 @@ def test_an_experts_legs_bend_last_and_pause_as_they_did(golden):
         figures[f"{seed}"] = [len(rows), *digest(rows[:, :3]), *digest(rows[:, 3:])]
         figures[f"{seed}: still"] = np.flatnonzero((rows[:, :3] == 0).all(1))
         figures[f"{seed}: first"] = rows[[3, -2]].round(4)
+    # who has many legs shows how often people pause, and for how long
+    many = [Leg(np.array([0.5 + 0.1 * (k % 2), 0, 0.02]), 0.2) for k in range(90)]
+    rows = np.array(list(acted(many, np.random.default_rng(0))))
+    still = (rows[:, :3] == 0).all(1)
+    figures["many"] = [len(rows), still.sum(), *digest(np.flatnonzero(still)), *digest(rows)]
     golden(figures, atol=2e-4)
 
 
