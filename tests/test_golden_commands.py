@@ -1,0 +1,196 @@
+"""Probes, test episodes and clips on their way are what they were."""
+
+import json
+from types import SimpleNamespace
+
+import gymnasium as gym
+import numpy as np
+import pytest
+import torch
+
+from lbw_minimal.clips.detector import Found
+from lbw_minimal.clips.footage import Footage
+from lbw_minimal.clips.reader import Clip
+from lbw_minimal.training import InputError
+from tasks.commands import prepare, probe, run
+from tasks.commands.choices import Choices
+from tests.toy_chance import cells
+from tests.toy_clips import arm
+
+# Probes
+
+
+class Seer:
+    """Keypoints that are the pixels, bent, noisy and mixed; a translation moves them."""
+
+    def __init__(self, pixels):
+        self.rng = np.random.default_rng(8)
+        self.z_E = self.detect(pixels)
+
+    def detect(self, frames):
+        z = frames @ np.array([[1.0, 0.3, 0, 0], [0, 1, 0.2, 0], [0.1, 0, 1, 0], [0, 0, 0.5, 1]])
+        return (np.sin(z / 70) + self.rng.normal(0, 0.03, z.shape)).reshape(-1, 2, 2)
+
+    def translate(self, frames):
+        return frames * (1.05, 1, 0.97, 1) + (2, -1, 0, 1)
+
+
+def test_a_probe_finds_what_it_found(monkeypatch, golden):
+    asked = []
+
+    def record(env, frames, seed):
+        asked.extend([frames, seed])
+        pixels = np.random.default_rng([seed, env.arm == "human"]).uniform(-2, 86, (frames, 4))
+        return pixels, pixels
+
+    t = np.arange(40.0)[:, None]
+    way = np.hstack([20 + t, 50 - t / 3, np.maximum(32, 26 + t), 40 + 0 * t])
+    monkeypatch.setattr(probe, "record_random", record)
+    monkeypatch.setattr(probe, "record_expert", lambda env, seed: (asked.append(seed) or way, 0))
+    monkeypatch.setattr(probe.tasks, "bare", lambda name, embodiment: SimpleNamespace(
+        arm=embodiment, CONTACT=0.04))  # fmt: skip
+    found, figures = probe.probe("push", Seer(way + (0, 0, 3, 0)), 11, 120), {}
+    for where in probe.SETS:
+        for name, row in found[where].items():
+            figures[f"{where} {name}"] = [row["r2"], row["px"]]
+    bend = probe.linear(Seer(way).detect(way), way)
+    shown, kept = probe.in_picture(np.arange(40), way - (20, 0, 40, 0))
+    golden(
+        figures | {"asked": asked, "std": found["keypoint_std"],
+                   "contact": list(found["contact_px"].values()), "names": list(found),
+                   "linear": bend(Seer(way).detect(way + 1))[::13].ravel(),
+                   "in picture": [*shown, *kept.mean(0)]},
+        rtol=2e-3, atol=1e-3,
+    )  # fmt: skip
+
+
+# Test episodes
+
+
+class Scene(gym.Env):
+    """Five steps; a success at the third and, if the seed is even, at the last."""
+
+    observation_space = action_space = gym.spaces.Box(-1, 1, (3,), np.float32)
+
+    def __init__(self, ends):
+        self.world, self.ends = SimpleNamespace(render=lambda: np.full((2, 2), self.t)), ends
+
+    def reset(self, *, seed=None, options=None):
+        self.t, self.seed = 0, seed
+        return np.full(3, seed % 100, np.float32), {}
+
+    def step(self, action):
+        self.t += 1
+        z = np.asarray(action, np.float32) + self.t
+        won = (self.t == 3 and self.seed % 3 > 0) or (self.t == 5 and self.seed % 2 == 0)
+        over = self.t == 5
+        info = {"is_success": won, "reward_parts": {"r": self.t}}
+        return z, 0.0, over and self.ends == "terminated", over and self.ends != "terminated", info
+
+
+@pytest.mark.parametrize("ends", ["terminated", "truncated"])
+def test_test_episodes_are_played_and_kept_as_they_were(ends, monkeypatch, golden):
+    snaps = []
+    scene = SimpleNamespace(
+        snap=lambda: snaps.append(1), html=lambda title: f"{title}: {len(snaps)}"
+    )
+    monkeypatch.setattr(run, "mirror", lambda env: scene)
+    asked = []
+    agent = SimpleNamespace(act=lambda z, deterministic: asked.append(deterministic) or z / 2)
+    rows, first, shown = run.evaluate(agent, Scene(ends), 4)
+    golden(
+        {"rows": json.dumps(rows), "film": first["frames"], "z": first["z"], "scene": shown,
+         "parts": json.dumps(first["parts"]), "asked": [len(asked), *asked]}
+    )  # fmt: skip
+
+
+def a_job(**args):
+    given = {"evaluate": False, "jitter": 0.02, "seed": 6, "method": "tracks"}
+    return SimpleNamespace(
+        name="push", recipe="recipe", demo="demo", weights="w",
+        args=SimpleNamespace(**given | args), run=SimpleNamespace(metrics={"stages": {}}),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("evaluate", [True, False])
+@pytest.mark.parametrize("how", ["learn", "track"])
+def test_a_replay_brings_its_policy_and_a_strangers_is_refused(how, evaluate, monkeypatch):
+    """One that sees four numbers where three are given."""
+    agent, told = SimpleNamespace(sizes={"obs_dim": 3}), []
+    env = SimpleNamespace(observation_space=SimpleNamespace(shape=(3,)))
+    monkeypatch.setattr(torch, "set_num_threads", told.append)
+    monkeypatch.setattr(run, "bring", lambda job, *names: told.append(names))
+    monkeypatch.setattr(run.gym, "make", lambda name, jitter: told.append((name, jitter)))
+    monkeypatch.setattr(run, "imitate", lambda *a, **k: told.append(k["seed"]) or (agent, env))
+    monkeypatch.setattr(run, "follow", lambda made, *a, **k: told.append((a, k)) or (agent, env))
+    monkeypatch.setattr(run.tasks, "pace_film", lambda *of: of)
+    monkeypatch.setattr(run.tracks, "draw", lambda demo: f"drawn {demo}")
+    job = a_job(evaluate=evaluate, reward="mended", without=None)
+    act = (lambda: run.learn(job, "seer", "film")) if how == "learn" else lambda: run.track(job)
+    done = act()
+    assert done[:2] == (agent, env) and told[0] == 1
+    assert (("policy",) in told) == evaluate and ("LbW-Push-v0", 0.02) in told
+    if how == "track":
+        assert done[2] == {"demo": "drawn demo"}
+        assert told[-1] == (("demo", ("push", 6, 400), "recipe"), {"seed": 6, "run": job.run})
+    agent.sizes["obs_dim"] = 4
+    option = "--reward" if how == "learn" else "--method"
+    said = f"w: that policy sees 4 numbers, and 3 come with this {option[2:]}; give the {option} "
+    with pytest.raises(InputError, match=said):
+        act()
+
+
+def test_a_robots_film_is_of_the_runs_seed_and_its_seconds_are_noted(monkeypatch):
+    job, clock = a_job(), iter([10.0, 12.345])
+    monkeypatch.setattr(run.time, "monotonic", lambda: next(clock))
+    monkeypatch.setattr(run.tasks, "pace_film", lambda *of: of)
+    assert run.film_robot(job, 55) == ("push", 6, 55)
+    assert job.run.metrics["stages"] == {"robot_video": 2.3}
+
+
+# A clip on its way
+
+
+def found(T, width):
+    """A hand and a thing that it pushes, with stretches in which neither is sure."""
+    hand = np.stack([np.interp(np.arange(T), [0, 5, T - 5], [20, 60, 0.8 * width]),
+                     np.interp(np.arange(T), [0, 5], [20, 60])], 1)  # fmt: skip
+    thing = np.stack([np.maximum(76, hand[:, 0] + 12), np.full(T, 62.0)], 1)
+    return Found(hand, thing, np.where(np.arange(T) == 7, 0.2, 0.9), np.full(T, 0.8))
+
+
+def test_a_clip_is_searched_with_its_marks_and_its_shorter_side_as_it_was(monkeypatch, golden):
+    frames, laid = arm(np.linspace(0, 0.8, 40)), []
+    clip = Clip(frames, 1.0 + np.arange(40) / 20, [], [])
+    monkeypatch.setattr(prepare, "look", lambda frames, cuts: found(len(frames), 160))
+    monkeypatch.setattr(prepare, "lay", lambda *what: laid.append(what))
+    monkeypatch.setattr(prepare.footage, "check", lambda frames, cuts: Footage(
+        255 - frames, ["It trembles."], 0.3, True))  # fmt: skip
+    result = prepare.Prepared(clip, "scene", warnings=["read"])
+    marks = Choices(tip=((30.0, 40.0, 1.2), (50.0, 60.0, 1.5)), object=((90.0, 60.0, 2.0),))
+    prepare.follow(result, marks)
+    (tracks, scene, mirror), = laid  # fmt: skip
+    golden(
+        {"tip": tracks.tip[::4], "object": tracks.object[::4], "sure": tracks.tip_sure,
+         "rest": [tracks.side, *tracks.cuts, tracks.enters, tracks.unmoved, *tracks.times[[0, -1]]],
+         "yours": str(tracks.yours), "notes": result.notes, "warnings": result.warnings,
+         "clip": result.clip.frames.mean(), "asked": [scene, str(mirror)]}
+    )  # fmt: skip
+
+
+def test_a_film_of_the_kits_own_is_told_and_taken_as_it_was(golden):
+    first = arm([0.4])[0][:84, :84]
+    figures = {}
+    for step in (0.04, 0.05, 0.051):
+        for off in (11, 12, 13):
+            frames = np.repeat(np.clip(first.astype(int) + off, 0, 255)[None], 6, 0).astype(
+                np.uint8
+            )
+            clip = Clip(frames, 2 + np.arange(6) * step, [], [])
+            figures[f"{step} {off}"] = prepare.is_own(clip, first)
+    result = prepare.Prepared(Clip(arm(np.linspace(0.2, 0.7, 9)), 3 + np.cumsum(
+        [0, 0.05, 0.03, 0.04, 0.06, 0.02, 0.04, 0.04, 0.05]), [], []), "scene")  # fmt: skip
+    prepare.take_as_it_is(result)
+    golden({"own": "".join("01"[own] for own in figures.values()), "shape": result.film.shape,
+            "film": result.film.mean((1, 2, 3)), "last": cells(result.film[-1].mean(2), 3),
+            "notes": result.notes}, atol=0.5)  # fmt: skip
