@@ -242,6 +242,16 @@ def test_times_count_from_the_streams_own_start(tmp_path):
     assert decoder.covered == pytest.approx(1.2, abs=0.05)
 
 
+@pytest.mark.parametrize(("name", "codec"), [("a.mkv", "libx264"), ("a.webm", "libvpx")])
+def test_a_film_whose_clock_begins_late_is_not_cut_short(name, codec, tmp_path):
+    """By half a second; such a file states when it ends, and others how long they are."""
+    path = encode(tmp_path / name, reach(30), codec, times=0.5 + np.arange(30) / 25)
+    _, decoder, times = decoded(path)
+    assert times[-1] == pytest.approx(1.16, abs=2e-3)
+    assert decoder.promised == pytest.approx(1.2, abs=0.05) == decoder.covered
+    assert len(read_clip(path).frames) == 30
+
+
 def test_a_glance_takes_key_frames_a_second_apart(tmp_path):
     """There is one every 0.48 s, so every third is taken."""
     path = encode(tmp_path / "a.mp4", reach(100), options={"g": "12", "sc_threshold": "0"})

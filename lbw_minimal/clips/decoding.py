@@ -124,10 +124,12 @@ class Decoder:
             stream.codec_context.thread_count = THREADS
             if self.sparse:
                 stream.codec_context.skip_frame = "NONKEY"
+            origin = (container.start_time or 0) / av.time_base
             if self.start > 0:
-                origin = (container.start_time or 0) / av.time_base
                 container.seek(int((origin + self.start) * av.time_base))
             self.promised = (container.duration or 0) / av.time_base
+            if container.format.name.startswith("matroska"):  # it counts from 0, not from there
+                self.promised -= origin
             if container.format.name == "avi":  # there FFmpeg believes the file's size instead
                 self.promised = max(self.promised, stream.frames / self.stream.rate)
             first = float((stream.start_time or 0) * stream.time_base)
