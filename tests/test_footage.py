@@ -36,8 +36,8 @@ def arms(room, *sides, frames=30):
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_one_arm_before_a_camera_that_stands_still_is_fine(room, side):
     film = arms(room, side)
-    frames, warnings, *_ = footage.check(film)
-    assert warnings == [] and frames is film
+    seen = footage.check(film)
+    assert seen.warnings == [] and seen.frames is film and seen.doubt is None
 
 
 @pytest.mark.parametrize("name", TASKS)
@@ -89,15 +89,20 @@ def two_people(room):
     return arms(room, "left", "right"), "several people"
 
 
-@pytest.mark.parametrize(
-    "fault",
-    [still, panned, hand_held, few_frames, no_arm, lamp, two_people],
-    ids=lambda f: f.__name__,
-)
+@pytest.mark.parametrize("fault", [still, panned, hand_held, few_frames], ids=lambda f: f.__name__)
 def test_other_footage_is_refused_with_the_reason(room, fault):
     frames, reason = fault(room)
     with pytest.raises(Unusable, match=reason):
         footage.check(frames)
+
+
+@pytest.mark.parametrize("fault", [no_arm, lamp, two_people], ids=lambda f: f.__name__)
+def test_whether_one_arm_moves_is_doubted_with_the_reason_and_two_remedies(room, fault):
+    """A user who sees one arm there can say so: that is no fact, as a moving camera is."""
+    frames, reason = fault(room)
+    why, remedy = footage.check(frames).doubt
+    assert reason in why and remedy.startswith("film ")
+    assert remedy.endswith("if one arm is there after all, show its tip on the page")
 
 
 def test_a_camera_that_trembles_is_steadied_with_a_warning(room):
@@ -169,8 +174,7 @@ def test_a_lamp_that_swings_at_the_edge_is_no_arm(room):
     film, reason = no_arm(room)
     for i, frame in enumerate(film):
         cv2.circle(frame, (130 + int(6 * np.sin(i)), 4), 8, (250, 240, 150), -1)
-    with pytest.raises(Unusable, match=reason):
-        footage.check(film)
+    assert reason in footage.check(film).doubt[0]
 
 
 @pytest.mark.parametrize(("share", "two"), [(0.04, False), (0.06, True)])
@@ -179,12 +183,8 @@ def test_arms_from_both_sides_in_a_twentieth_of_the_frames_are_two_people(
 ):
     both = np.array([[0.0, 0.9 if i % 100 < 100 * share else 0.6] for i in range(100)])
     monkeypatch.setattr(footage, "_doors", lambda moves: both)
-    film = arms(room, "left", frames=60)
-    if two:
-        with pytest.raises(Unusable, match="several people"):
-            footage.check(film)
-    else:
-        assert footage.check(film).warnings == []
+    doubt = footage.check(arms(room, "left", frames=60)).doubt
+    assert ("several people" in doubt[0]) if two else doubt is None
 
 
 @pytest.mark.parametrize(

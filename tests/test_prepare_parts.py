@@ -146,6 +146,30 @@ def test_a_mark_lies_in_the_picture_and_in_the_clips_seconds(mark, inside, monke
                 follow(result, choices)
 
 
+@pytest.mark.parametrize("name", ["", "tip", "object"])
+def test_a_user_who_places_the_tip_overrules_that_there_is_no_arm(name, monkeypatch):
+    """It is searched all the same, so that the page shows what was found and can be corrected."""
+    nothing = Found(np.zeros((6, 2)), np.zeros((6, 2)), np.zeros(6), np.zeros(6))
+    monkeypatch.setattr(prepare, "look", lambda frames, cuts: nothing)
+    doubt = "no arm is seen", "film one"
+    monkeypatch.setattr(
+        prepare.footage, "check", lambda frames, cuts: Footage(frames, [], 0.5, False, doubt)
+    )
+    monkeypatch.setattr(prepare, "lay", lambda tracks, scene, mirror: "laid")
+    result = prepared()
+    choices = Choices(**({name: ((5.0, 5.0, 0.1),)} if name else {}))
+    if name == "tip":
+        assert follow(result, choices) == "laid"
+        assert result.warnings == [
+            "No arm is seen: it was searched all the same, because you placed the tip."
+        ]
+    else:
+        with pytest.raises(Unusable, match=r"^no arm is seen; film one\.$"):
+            follow(result, choices)
+        assert result.warnings == []
+    assert result.tracks is not None
+
+
 def test_84_pixels_are_enough_and_83_are_not(monkeypatch):
     checked = []
     monkeypatch.setattr(

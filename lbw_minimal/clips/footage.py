@@ -29,6 +29,7 @@ SOMETIMES = 2  # frames in which something moves: noise does so in one
 APART = 0.7  # of the width: one arm never comes in at places so far apart
 OFTEN = 0.05  # of the frames: an arm at its median place is not told from the room
 ENDS = 16  # a clip's first and last frames are so many of it
+SHOW = "; or, if one arm is there after all, show its tip on the page"
 
 
 class Footage(NamedTuple):
@@ -38,14 +39,17 @@ class Footage(NamedTuple):
     warnings: list[str]
     enters: float  # where the arm comes in, 0 at the picture's left edge, 1 at its right; or nan
     unmoved: bool  # whether the last frames look as the first ones, but for what comes in
+    # why it may be no footage of one arm, and what to film otherwise, for `Unusable`; a user who
+    # sees one there knows better
+    doubt: tuple[str, str] | None = None
 
 
 def check(frames: np.ndarray, cuts: Sequence[int] = ()) -> Footage:
     """The frames as they can be searched, and what the arm does at the picture's edges.
 
     cuts: frames with which a new shot begins; the longest one is asked, and all are steadied.
-    Raises Unusable if the shot has few frames, if nothing moves in it, if the camera moves, or if
-    two arms do the moving.
+    Raises Unusable if the shot has few frames, if nothing moves in it, or if the camera moves.
+    Whether one arm does the moving is doubted only.
     """
     shots = list(pairwise([0, *cuts, len(frames)]))
     first, last = max(shots, key=lambda shot: shot[1] - shot[0])
@@ -61,17 +65,23 @@ def check(frames: np.ndarray, cuts: Sequence[int] = ()) -> Footage:
     if warnings:
         still, background, _ = before_background(frames[first:last])
     off = np.abs(still - background)
-    if not _comes_in(off > FAINT):
-        raise Unusable("no arm is seen, nothing large that moves comes in from the edge", SIDE_ON)
     doors = _doors(off > MOVED)
-    if (np.nan_to_num(np.ptp(doors, axis=1)) >= APART).mean() > OFTEN:
-        raise Unusable(
-            "arms come in over opposite edges of the picture, as of several people",
-            "film one arm, and let nothing else move near the edges",
-        )
     # At its median place an arm looks like the room.
     enters = float(np.nanmean(doors)) if np.isfinite(doors).any() else np.nan
-    return Footage(frames, warnings, enters, _unmoved(still))
+    doubt = _doubt(_comes_in(off > FAINT), doors)
+    return Footage(frames, warnings, enters, _unmoved(still), doubt)
+
+
+def _doubt(comes_in, doors):
+    """Why the clip may show no arm, or several people, and the remedy; None if it shows one."""
+    if not comes_in:
+        return "no arm is seen, nothing large that moves comes in from the edge", f"{SIDE_ON}{SHOW}"
+    if (np.nan_to_num(np.ptp(doors, axis=1)) >= APART).mean() > OFTEN:
+        return (
+            "arms come in over opposite edges of the picture, as of several people",
+            f"film one arm, and let nothing else move near the edges{SHOW}",
+        )
+    return None
 
 
 def _steadied(frames, shots, longest):

@@ -195,6 +195,14 @@ def follow(result: Prepared, choices: Choices) -> Motion:
     )  # fmt: skip
     tracks = tracks.marked("tip", list(choices.tip)).marked("object", list(choices.object))
     result.tracks = tracks
+    if seen.doubt and not choices.tip:
+        raise Unusable(*seen.doubt)
+    if seen.doubt:
+        reason, _ = seen.doubt
+        result.warnings.append(
+            f"{reason[0].upper()}{reason[1:]}: it was searched all the same, because you placed "
+            "the tip."
+        )
     rate = (len(frames) - 1) / max(1e-9, tracks.times[-1] - tracks.times[0])
     result.notes.append(
         f"{len(frames)} frames at {rate:.3g} a second; their motion was smoothed and taken at "
