@@ -292,6 +292,24 @@ def test_a_correction_does_not_go_beyond_a_cut():
     assert not any(both.is_yours("object", i) for i in range(20))
 
 
+@pytest.mark.parametrize(
+    ("second", "path"),
+    [(54.0, [50, 58, 59, 53, 54, 51.2]), (54.4, [50, 51.1, 52.2, 53.3, 54.4, 51.52])],
+)
+def test_marks_alone_make_the_path_between_them_where_something_else_was_found(second, path):
+    """At 10 frames a second the dot rests at 40, but for two frames in which it leaps to 47.
+
+    Clicks by 10 and 14 pixels beside it move it, leap and all. Once they differ by more than 4 of
+    the picture's 100, they are not of what was found: a straight line joins them. Beyond the second
+    it is left for the dot within half a second in either case.
+    """
+    x = np.full(30, 40.0)
+    x[[11, 12]] = 47
+    found = tracks(x, sure=np.full(30, 0.8), rate=10)
+    marked = found.marked("tip", [(50.0, 50.0, 1.0), (second, 50.0, 1.4)])
+    np.testing.assert_allclose(marked.tip[10:16, 0], path)
+
+
 def test_marks_alone_make_the_path_where_nothing_was_found():
     """They count in the order of their times, and of two at one time the later."""
     lost = replace(tracks(np.full(21, 50.0), rate=20), tip_sure=np.zeros(21))

@@ -72,8 +72,9 @@ class Tracks:
 
         Between the first and the last mark the correction is interpolated, and what is there counts
         as sure. Beyond them it fades out, and frames that it does not move stay as they were found,
-        with their own sureness. It does not go beyond a cut. Where nothing is sure, the marks alone
-        make the path. Of two marks at one time the later in the list counts.
+        with their own sureness. It does not go beyond a cut. Where nothing is sure, or something
+        else was found, the marks alone make the path. Of two marks at one time the later in the
+        list counts.
         """
         if not marks:
             return self
@@ -86,15 +87,19 @@ class Tracks:
             inside = np.array([latest[s] for s in sorted(latest) if first <= frame[s] < last])
             if len(inside):
                 path[part], sure[part] = _corrected(
-                    self.times[part], path[part], sure[part], inside
+                    self.times[part], path[part], sure[part], inside, STANDS * self.side
                 )
                 start, end = (float(self.times[frame[s]]) for s in inside[[0, -1], 2])
                 yours.append((name, start, end))
         return replace(self, yours=tuple(yours), **{name: path, f"{name}_sure": sure})
 
 
-def _corrected(t, found, own, marks):
-    """A path found (T, 2) and its sureness (T,), as `Tracks.marked` corrects them in one piece."""
+def _corrected(t, found, own, marks, least):
+    """A path found (T, 2) and its sureness (T,), as `Tracks.marked` corrects them in one piece.
+
+    least: pixels. Where two marks in turn are off by more than that from each other, the path found
+    between them is not that of one thing, and so its shape says nothing.
+    """
     s, sure = marks[:, 2], own >= SURE
     path = interpolate(t[sure], found[sure], t) if sure.any() else np.zeros_like(found)
     off = marks[:, :2] - interpolate(t, path, s)
@@ -103,6 +108,9 @@ def _corrected(t, found, own, marks):
     at = np.array([before, *s, after])[within]
     moved = (t > before) & (t < after)
     path = path + interpolate(at, np.pad(off, ((1, 1), (0, 0)))[within], t)
+    for i in np.flatnonzero(np.linalg.norm(np.diff(off, axis=0), axis=1) > least):
+        between = (t >= s[i]) & (t <= s[i + 1])
+        path[between] = interpolate(s[i : i + 2], marks[i : i + 2, :2], t[between])
     away = np.maximum(0, np.maximum(s[0] - t, t - s[-1]))  # (T,) s
     near = np.maximum(own, 1 - away / FADE)
     return np.where(moved[:, None], path, found), np.where(moved, near, own)
