@@ -60,8 +60,26 @@ def test_a_usable_clip_is_told_with_its_warnings_and_how_to_learn_from_it(
         "warning: It is far.", f"learn: {learn}",
     ]  # fmt: skip
     result.why_not = "no arm is seen."
-    assert prepare.main(argv) == 2 and "learn:" not in capsys.readouterr().out
+    assert prepare.main(argv) == 2
+    assert capsys.readouterr().out.splitlines()[2:] == [
+        "warning: It is dark.",
+        "warning: It is far.",
+    ]
     assert asked[-1] == ("push", result, note, "")
+
+
+def test_a_clip_refused_for_what_was_found_in_it_can_be_corrected_by_a_click(
+    tmp_path, monkeypatch, capsys
+):
+    result = prepared(why_not="the object never moves.", tracks="found")
+    monkeypatch.setattr(prepare, "prepare", lambda *what: result)
+    monkeypatch.setattr(prepare, "write", lambda out, *what: out / "page")
+    (tmp_path / "a.mp4").touch()
+    assert prepare.main(["push", str(tmp_path / "a.mp4"), "--out", str(tmp_path)]) == 2
+    assert capsys.readouterr().out.splitlines() == [
+        "not usable: the object never moves.", f"page: {tmp_path / 'page'}",
+        "or else: if a dot on the page is wrong, click there where it should be",
+    ]  # fmt: skip
 
 
 def test_each_clip_is_prepared_in_a_folder_of_its_own(tmp_path, monkeypatch, capsys):
@@ -100,7 +118,8 @@ def test_a_run_on_a_clip_says_what_is_odd_about_it_or_why_it_is_none(tmp_path, m
     assert prepare.usable("push", tmp_path) is result
     assert capsys.readouterr().err == f"warning: {tmp_path}: It is dark.\n"
     result.why_not = "no arm is seen."
-    with pytest.raises(InputError, match="no arm is seen"):
+    look = f"shows: python -m tasks prepare push {tmp_path}$"
+    with pytest.raises(InputError, match=rf"no arm is seen\. What was seen in it, .*{look}"):
         prepare.usable("push", tmp_path)
 
 

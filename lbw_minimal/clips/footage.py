@@ -29,7 +29,6 @@ SOMETIMES = 2  # frames in which something moves: noise does so in one
 APART = 0.7  # of the width: one arm never comes in at places so far apart
 OFTEN = 0.05  # of the frames: an arm at its median place is not told from the room
 ENDS = 16  # a clip's first and last frames are so many of it
-SHOW = "; or, if one arm is there after all, show its tip on the page"
 
 
 class Footage(NamedTuple):
@@ -75,11 +74,11 @@ def check(frames: np.ndarray, cuts: Sequence[int] = ()) -> Footage:
 def _doubt(comes_in, doors):
     """Why the clip may show no arm, or several people, and the remedy; None if it shows one."""
     if not comes_in:
-        return "no arm is seen, nothing large that moves comes in from the edge", f"{SIDE_ON}{SHOW}"
+        return "no arm is seen, nothing large that moves comes in from the edge", SIDE_ON
     if (np.nan_to_num(np.ptp(doors, axis=1)) >= APART).mean() > OFTEN:
         return (
             "arms come in over opposite edges of the picture, as of several people",
-            f"film one arm, and let nothing else move near the edges{SHOW}",
+            "film one arm, and let nothing else move near the edges",
         )
     return None
 

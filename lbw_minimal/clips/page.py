@@ -40,6 +40,10 @@ OPTIONS = [
     ),
     ("--object X,Y@S", "and the object at these"),
 ]
+UNLESS = """
+<p>So it is with what was found in the clip. Is a dot below not on the tip, or not on the object?
+Click where it should be: the clip may be usable after all.</p>
+"""
 FIRST = """
 <p id="first" class="note" hidden>Run the corrected command above first: this one learns the motion
 as it is now.</p>
@@ -85,6 +89,7 @@ def write_page(
     head, _, rest = verdict.partition(": ")
     why = escape(rest[:1].upper() + rest[1:])
     page = [f"<h1>{escape(task).capitalize()}: {escape(head)}</h1>", f"<p>{why}</p>"]
+    page += [UNLESS] if tracks is not None and head == "not usable" else []
     page += [f'<p class="note">{escape(warning)}</p>' for warning in warnings]
     if columns and shown is not None:
         seen = clip_column(frames, times, tracks, motion, shown)

@@ -113,6 +113,8 @@ def main(argv: list[str]) -> int:
     for warning in result.warnings:
         print(f"warning: {warning}")
     if result.why_not:
+        if result.tracks is not None:
+            print("or else: if a dot on the page is wrong, click there where it should be")
         return 2
     print(f"learn: {learn}")
     return 0
@@ -160,7 +162,10 @@ def usable(name: str, path: Path) -> Prepared:
     """
     clip = prepare(name, path)
     if clip.why_not:
-        raise InputError(f"{path}: {clip.why_not}")
+        look = shlex.join(["python", "-m", "tasks", "prepare", name, str(path)])
+        raise InputError(
+            f"{path}: {clip.why_not} What was seen in it, and how to correct that, shows: {look}"
+        )
     for warning in clip.warnings:
         print(f"warning: {path}: {warning}", file=sys.stderr)
     return clip
