@@ -77,8 +77,9 @@ def _doubt(comes_in, doors):
         return "no arm is seen, nothing large that moves comes in from the edge", SIDE_ON
     if (np.nan_to_num(np.ptp(doors, axis=1)) >= APART).mean() > OFTEN:
         return (
-            "arms come in over opposite edges of the picture, as of several people",
-            "film one arm, and let nothing else move near the edges",
+            "arms come in over opposite edges of the picture, as of several people, or of one who "
+            "fills it",
+            "film one arm, without the body, and let nothing else move near the edges",
         )
     return None
 
