@@ -41,8 +41,8 @@ OPTIONS = [
     ("--object X,Y@S", "and the object at these"),
 ]
 UNLESS = """
-<p>So it is with what was found in the clip. Is a dot below not on the tip, or not on the object?
-Click where it should be: the clip may be usable after all.</p>
+<p>It may have been seen wrongly. Is a dot below not on the tip, or not on the object? Click where
+it should be: the clip may be usable after all.</p>
 """
 FIRST = """
 <p id="first" class="note" hidden>Run the corrected command above first: this one learns the motion

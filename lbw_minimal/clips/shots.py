@@ -47,10 +47,12 @@ and between your clicks. Grey pictures are not used.</p>
 """
 CLICK = f"""
 <p>Is a dot wrong? Choose which, click where it should be, and run the command below. Another click
-into the same picture replaces the first. Two or three pictures are enough: between your first and
-your last click the correction is interpolated. Beyond them it fades out: within {FADE:g} s where
-the dot was full, by the next full dot where it was hollow, and where the clip jumps. All else stays
-as it was found. So click also on a dot that is right, where a correction should end.</p>
+into the same picture replaces the first. Two or three pictures are enough where a dot is beside its
+place: between your first and your last click the correction is interpolated. Beyond them it fades
+out: within {FADE:g} s where the dot was full, by the next full dot where it was hollow, and where
+the clip jumps. All else stays as it was found. So click also on a dot that is right, where a
+correction should end. Is a dot on something else all along? Click into every picture from just
+before it should move until the last.</p>
 """
 CUT = """
 <p>Is a part of the clip to be left out? Choose the first or the last picture to use, and click it.
