@@ -19,6 +19,20 @@ def test_learning_rate_holds_for_half_the_training_and_then_falls_to_nothing():
     assert rates == [8, 8, 4, 0]
 
 
+def test_scores_of_half_the_digits_are_judged_with_all():
+    """0.30078125 has eight binary digits, and the square of what is missing to 1 has sixteen."""
+    score = torch.full((1, 1, 5, 5), 0.30078125, dtype=torch.bfloat16)
+    loss = gan.least_squares([score], 1.0, torch.ones(1, 1, 84, 84))
+    assert loss.item() == pytest.approx(0.69921875**2, rel=1e-6)
+
+
+def test_nothing_is_learnt_from_repainting():
+    """A graph of a whole video would take gigabytes."""
+    learns = []
+    gan.repaint(blocks(2, 0), lambda v: learns.append(torch.is_grad_enabled()) or v, "cpu")
+    assert learns == [False]
+
+
 def test_adams_memory_is_the_publications():
     assert gan.adam(nn.Linear(1, 1), 1.0).param_groups[0]["betas"] == (0.5, 0.999)
 
