@@ -12,6 +12,7 @@ def test_frames_survive_the_way_to_images_and_back():
     frames = np.arange(192, dtype=np.uint8).reshape(2, 4, 8, 3)
     images = to_images(frames)
     assert images.shape == (2, 3, 4, 8) and np.array_equal(to_frames(images), frames)
+    assert images.is_contiguous()  # each channel in one piece, whichever way layers then go
 
 
 def test_black_is_minus_one_and_white_is_one():
