@@ -222,6 +222,8 @@ def test_arms_come_in_where_they_did(golden):
         moved[50 : 50 + t, : 2 * t] = True
         moved[80:, 84 - t :] = True
         moved[30:50, 76 - t % 9 :] |= t % 3 == 0
+        moved[8:30, 60 : 78 + t % 7] |= t % 4 == 1
+        moved[t % 5 : 30, 30:44] |= t % 4 == 3
     doors, figures = footage._doors(moves), {}
     for t in range(0, 24, 4):
         labels, stats = footage._things(moves[t])

@@ -6,12 +6,13 @@ import cv2
 import numpy as np
 import pytest
 import torch
+from safetensors.torch import load_file
 
 from lbw_minimal.clips import corners, detector, detector_networks, patches
 from lbw_minimal.clips.detector import Detector, Found
 from lbw_minimal.clips.drawings import Clip, draw_clip
 from lbw_minimal.images import to_images
-from lbw_minimal.training import Checkpoint
+from lbw_minimal.training import Checkpoint, InputError
 from tasks.commands.eyes import Seen, compare
 from tests.toy_chance import Told, cells
 from tests.toy_clips import room
@@ -201,7 +202,7 @@ def a_clip(height, width, T=70):
     return frames, hand, thing
 
 
-@pytest.mark.parametrize("size", [(60, 112), (150, 96), (84, 84)])
+@pytest.mark.parametrize("size", [(60, 112), (150, 96), (84, 84), (40, 52)])
 def test_frames_are_fitted_and_read_back_as_they_were(size, golden):
     frames, _, _ = a_clip(*size)
     small, scale, corner = detector._fitted(frames[::9])
@@ -216,6 +217,23 @@ def test_frames_are_fitted_and_read_back_as_they_were(size, golden):
         },
         atol=1e-3,
     )  # fmt: skip
+
+
+def test_eyes_are_kept_in_half_precision_under_their_kind(tmp_path):
+    network = detector_networks.Network()
+    Detector(network).save(tmp_path / "eyes.safetensors")
+    kept = load_file(tmp_path / "eyes.safetensors")
+    assert {value.dtype for value in kept.values()} == {torch.float16}
+    back = Detector.load(tmp_path / "eyes.safetensors").network
+    assert not back.training
+    for name, value in network.state_dict().items():
+        torch.testing.assert_close(back.state_dict()[name], value.half().float())
+    with pytest.raises(InputError, match=r"frames are \(9, 84, 84\) uint8; give a clip"):
+        Detector(network).detect(np.zeros((9, 84, 84), np.uint8))
+    for wrong in (np.zeros((0, 84, 84, 3), np.uint8), np.zeros((9, 84, 84, 3), np.int16),
+                  np.zeros((9, 84, 84, 4), np.uint8)):  # fmt: skip
+        with pytest.raises(InputError, match="give a clip"):
+            Detector(network).detect(wrong)
 
 
 def test_a_second_look_is_as_close_and_counts_as_it_did(golden):
@@ -255,6 +273,8 @@ def test_what_is_looked_at_twice_is_put_together_as_it_was(golden, monkeypatch):
 def pushed():
     frames, hand, thing = a_clip(120, 200, 32)
     rng = np.random.default_rng(2)
+    noise = rng.normal(0, np.linspace(4, 110, 32)[:, None, None, None], frames.shape)
+    frames = np.clip(frames + noise, 0, 255).astype(np.uint8)  # it gets dark
     sure = np.where(np.arange(32) % 7 == 3, 0.3, rng.uniform(0.6, 1, 32)).astype(np.float32)
     tip_sure = np.where(np.arange(32) % 5 == 2, 0.3, 0.9).astype(np.float32)
     noisy = (thing + rng.normal(0, 1.2, thing.shape)).astype(np.float32)
@@ -262,13 +282,18 @@ def pushed():
 
 
 def test_the_objects_corners_are_followed_as_they_were(pushed, golden):
-    frames, found, _, _ = pushed
+    frames, found, _, thing = pushed
     refined = detector.refine(frames, found, (25,))
     grey = np.stack([cv2.cvtColor(frame, cv2.COLOR_RGB2GRAY) for frame in frames])
     paths = corners.follow(grey[:12])
     own, middle = corners.objects_own(corners.follow(grey), found.object, 200 / 84)
+    # Nothing is to be seen at first, and then the picture jumps twice.
+    late = np.concatenate([0 * frames[:7], frames[:12], frames[::-1][:4], frames[:20]])
+    way = np.concatenate([thing[:19], thing[::-1][:4], thing[:20]])
+    again, known = corners.followed(late, np.where(np.arange(43)[:, None] % 9 == 5, np.nan, way))
     golden(
         {
+            "again": np.nan_to_num(again[::2], nan=-1), "known": known,
             "object": refined.object[::3], "sure": refined.object_sure,
             "corners": [paths.shape[1], np.isfinite(paths).sum(), np.nanmean(paths), own.sum()],
             "middle": middle[own].mean(0),
@@ -290,7 +315,7 @@ def test_patches_are_looked_for_and_chosen_as_they_were(pushed, golden):
     mend = patches.mended(shots, Found(*map(np.concatenate, both)), (32,))
     small, figures = patches.shrunk(frames[::2], 0.8), {}
     tip = patches._tip(found, np.arange(0, 32, 2), 0.8)
-    some = patches.paths(small, [(0, 0.8 * thing[0]), (15, 0.8 * thing[30]), (4, (3.0, 90))], tip)
+    some = patches.paths(small, [(0, 0.8 * thing[0]), (15, 0.8 * thing[30]), (4, (3.0, 30))], tip)
     for i, path in enumerate(some):
         figures[f"path {i}"] = [*path.places[::2].ravel(), path.side]
         figures[f"is {i}"] = [path.way, path.start, path.alone, path.worth, path.seen, path.pushed]
