@@ -194,3 +194,96 @@ def test_a_film_of_the_kits_own_is_told_and_taken_as_it_was(golden):
     golden({"own": "".join("01"[own] for own in figures.values()), "shape": result.film.shape,
             "film": result.film.mean((1, 2, 3)), "last": cells(result.film[-1].mean(2), 3),
             "notes": result.notes}, atol=0.5)  # fmt: skip
+
+
+def levels(n, first=0):
+    """Frames (n, 84, 84, 3) of one grey each, from `first` on."""
+    return np.arange(first, first + n, dtype=np.uint8)[:, None, None, None].repeat(
+        84, 1).repeat(84, 2).repeat(3, 3)  # fmt: skip
+
+
+def test_a_page_shows_the_film_its_translation_and_the_keypoints_of_that(tmp_path, monkeypatch):
+    """Seventy frames, of which sixty are shown; a translation adds a hundred."""
+    asked = {}
+    seer = SimpleNamespace(translate=lambda film: film + 100, detect=lambda film: film[:, 0, 0, 0])
+    monkeypatch.setattr(prepare.imitate, "load_perception", lambda *of: asked.update(of=of) or seer)
+    monkeypatch.setattr(prepare, "write_page", lambda page, **what: asked.update(what, page=page))
+    monkeypatch.setattr(prepare, "links", lambda page: f"links of {page.name}")
+    monkeypatch.setattr(prepare, "stills", lambda result: levels(2))
+    clip = Clip(levels(5), np.arange(5) / 10, [], [])
+    done = SimpleNamespace(motion="reenacted", recording=SimpleNamespace(states="states"))
+    note = {"clip": "a.mp4", "corrections": "", "command": "python"}
+    result = prepare.Prepared(clip, "scene", "tracks", "motion", done, levels(70), b"film",
+                              notes=["read"], warnings=["dark"])  # fmt: skip
+    assert prepare.write(tmp_path, "push", result, note, "learn") == tmp_path / "prepare.html"
+    film, translated, z = asked.pop("columns")
+    shown = asked.pop("shown")
+    assert len(shown) == 60 and (shown[0], shown[-1]) == (0, 69)
+    np.testing.assert_array_equal(film[:, 0, 0, 0], shown)
+    np.testing.assert_array_equal(translated[:, 0, 0, 0], shown + 100)
+    np.testing.assert_array_equal(z, shown + 100)
+    assert asked.pop("frames") is clip.frames and asked.pop("times") is clip.times
+    assert asked == {
+        "of": (prepare.tasks.WEIGHTS / "push", "push"), "page": tmp_path / "prepare.html",
+        "task": "push", "command": "python", "verdict": "usable, with a warning", "scene": "scene",
+        "notes": ["read"], "warnings": ["dark"], "tracks": "tracks", "motion": "reenacted",
+        "states": "states", "links": "links of prepare.html", "learn": "learn",
+    }  # fmt: skip
+    assert (tmp_path / "reenactment.mp4").read_bytes() == b"film"
+    assert json.loads((tmp_path / "prepare.json").read_text()) == note
+    assert (tmp_path / "stills.webp").exists()
+    for before in (prepare.FILM, prepare.NOTE, prepare.STILLS):
+        (tmp_path / before).unlink()
+    nothing = prepare.Prepared(clip, "scene", motion="laid", why_not="why.")
+    prepare.write(tmp_path, "push", nothing, note)
+    assert (asked["columns"], asked["shown"], asked["states"]) == ((), None, None)
+    assert (asked["motion"], asked["learn"]) == ("laid", "")
+    assert asked["verdict"] == "not usable: why." and not list(tmp_path.iterdir())
+
+
+def test_a_piece_of_a_clip_is_read_and_keeps_the_clips_own_seconds(monkeypatch, tmp_path):
+    """From 2 to 5 s; what was done comes in its order, and a reenactment's film is kept."""
+    told, motion = [], SimpleNamespace(notes=["laid"], warnings=["fast"])
+    done = SimpleNamespace(notes=["done"], warnings=["slipped"], frames="its frames")
+    env = SimpleNamespace(reset=lambda seed: (told.append(seed) or "picture", {}),
+                          scene=lambda: "scene", close=lambda: None)  # fmt: skip
+    own = SimpleNamespace(clip=None)
+
+    def read(path, **more):
+        told.append((path, more))
+        return Clip(levels(4), np.arange(4) / 10, [], ["read"], ["left out"])
+
+    def take(result):
+        own.clip = result.clip
+
+    monkeypatch.setattr(prepare.tasks, "bare", lambda name, embodiment: told.append(
+        (name, embodiment)) or env)  # fmt: skip
+    monkeypatch.setattr(prepare, "read_clip", read)
+    monkeypatch.setattr(prepare, "is_own", lambda clip, first: told.append(first) or True)
+    monkeypatch.setattr(prepare, "take_as_it_is", take)
+    monkeypatch.setattr(prepare, "follow", lambda result, choices: motion)
+    monkeypatch.setattr(prepare, "reenact", lambda *of: told.append(of) or done)
+    monkeypatch.setattr(prepare, "keep", lambda result, frames: told.append(frames))
+    result = prepare.prepare("push", "a.mp4", Choices(first=2.0, last=5.0))
+    assert told == [
+        ("a.mp4", {"start": 2.0, "end": 5.0}), ("push", "human"), 0, (env, motion), "its frames",
+    ]  # fmt: skip
+    assert result.clip.times == pytest.approx([2, 2.1, 2.2, 2.3]) and own.clip is None
+    assert result.notes == ["read", "laid", "done"] and result.scene == "scene"
+    assert result.warnings == ["left out", "fast", "slipped"] and result.done is done
+    told.clear()
+    whole = prepare.prepare("push", "a.mp4")
+    assert told == [("a.mp4", {"start": None, "end": None}), ("push", "human"), 0, "picture"]
+    assert own.clip is whole.clip and whole.motion is None and whole.notes == ["read"]
+
+
+def test_nothing_of_an_earlier_clip_stays_beside_one_that_is_not_usable(tmp_path, monkeypatch):
+    monkeypatch.setattr(prepare, "write", lambda out, *what: out / "page")
+    monkeypatch.setattr(prepare, "prepare", lambda *what: prepare.Prepared(
+        None, None, why_not="no arm."))  # fmt: skip
+    clip = tmp_path / "a.mp4"
+    names = ("reenactment.mp4", "stills.webp", "prepare.json", "other.txt")
+    for file in (clip, *(tmp_path / name for name in names)):
+        file.touch()
+    assert prepare.main(["push", str(clip), "--out", str(tmp_path)]) == 2
+    assert {file.name for file in tmp_path.iterdir()} == {"a.mp4", "other.txt"}

@@ -1,11 +1,13 @@
 """The eyes still learn, look, follow and mend as when the shipped ones were made and measured."""
 
 import itertools
+import json
 
 import cv2
 import numpy as np
 import pytest
 import torch
+from safetensors import safe_open
 from safetensors.torch import load_file
 
 from lbw_minimal.clips import corners, detector, detector_networks, patches
@@ -224,6 +226,9 @@ def test_eyes_are_kept_in_half_precision_under_their_kind(tmp_path):
     Detector(network).save(tmp_path / "eyes.safetensors")
     kept = load_file(tmp_path / "eyes.safetensors")
     assert {value.dtype for value in kept.values()} == {torch.float16}
+    with safe_open(tmp_path / "eyes.safetensors", "pt") as file:
+        said = json.dumps(file.metadata())
+    assert "eyes" in said and "any" in said
     back = Detector.load(tmp_path / "eyes.safetensors").network
     assert not back.training
     for name, value in network.state_dict().items():
