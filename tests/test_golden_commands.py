@@ -171,7 +171,8 @@ def test_a_clip_is_searched_with_its_marks_and_its_shorter_side_as_it_was(monkey
     prepare.follow(result, marks)
     (tracks, scene, mirror), = laid  # fmt: skip
     golden(
-        {"tip": tracks.tip[::4], "object": tracks.object[::4], "sure": tracks.tip_sure,
+        {"marked": [*tracks.tip[4], *tracks.tip[10], *tracks.object[20]],
+         "else": [*tracks.tip[-1], *tracks.object[0], *tracks.tip_sure[[4, -1]]],
          "rest": [tracks.side, *tracks.cuts, tracks.enters, tracks.unmoved, *tracks.times[[0, -1]]],
          "yours": str(tracks.yours), "notes": result.notes, "warnings": result.warnings,
          "clip": result.clip.frames.mean(), "asked": [scene, str(mirror)]}
