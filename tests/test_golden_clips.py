@@ -224,7 +224,12 @@ def test_arms_come_in_where_they_did(golden):
         moved[30:50, 76 - t % 9 :] |= t % 3 == 0
         moved[8:30, 60 : 78 + t % 7] |= t % 4 == 1
         moved[t % 5 : 30, 30:44] |= t % 4 == 3
-    doors, figures = footage._doors(moves), {}
+    near = np.zeros((15, 84, 84), bool)  # a block, so many pixels off each edge
+    for off in range(5):
+        near[off, 20:40, off : off + 20] = True
+        near[5 + off, 20:40, 64 - off : 84 - off] = True
+        near[10 + off, off : off + 20, 20:40] = True
+    doors, figures = footage._doors(np.concatenate([moves, near])), {}
     for t in range(0, 24, 4):
         labels, stats = footage._things(moves[t])
         figures[f"things {t}"] = [labels.max(), *stats.ravel()]

@@ -227,8 +227,8 @@ def test_eyes_are_kept_in_half_precision_under_their_kind(tmp_path):
     kept = load_file(tmp_path / "eyes.safetensors")
     assert {value.dtype for value in kept.values()} == {torch.float16}
     with safe_open(tmp_path / "eyes.safetensors", "pt") as file:
-        said = json.dumps(file.metadata())
-    assert "eyes" in said and "any" in said
+        kind, task, (model, _) = json.loads(file.metadata()["tree"])["dict"]
+    assert (kind, task, model) == (["kind", {"value": "eyes"}], ["task", {"value": "any"}], "model")
     back = Detector.load(tmp_path / "eyes.safetensors").network
     assert not back.training
     for name, value in network.state_dict().items():
