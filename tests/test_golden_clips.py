@@ -138,6 +138,13 @@ def test_a_file_of_several_streams_is_described_as_it_was(tmp_path, golden):
     figures = {f"stream {s.index}": [s.width, s.height, s.pixel, s.rate, s.seconds]
                for s in streams}  # fmt: skip
     clip = reader.read_clip(path)
+    with av.open(str(tmp_path / "a.avi"), "w") as out:  # its sound goes on
+        packets = add_sound(out, 2.0) + add(out, reach(30), "mpeg4", 25)
+        for packet in packets:
+            out.mux(packet)
+    (longer,), _ = look(tmp_path / "a.avi")
+    decoder = Decoder(tmp_path / "a.avi", longer)
+    figures["avi"] = [len(list(decoder)), longer.seconds, decoder.promised, decoder.covered]
     decoder = Decoder(path, streams[0])
     figures["decoded"] = [len(list(decoder)), decoder.packets, decoder.covered, decoder.promised]
     golden(figures | {"notes": clip.notes, "shape": clip.frames.shape}, atol=1e-3)
