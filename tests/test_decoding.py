@@ -225,8 +225,12 @@ def test_the_header_is_told_in_pixels_rates_and_seconds(tmp_path):
     assert decoder.covered == pytest.approx(1.5, abs=0.01) == decoder.promised
 
 
-@pytest.mark.parametrize(("stated", "taken"), [(2, 2.0), (4.8, 4.8), (6, 1.0), (0.1, 1.0)])
+@pytest.mark.parametrize(
+    ("stated", "taken"),
+    [(2, 2.0), (4.8, 4.8), (6, 1.0), (0.1, 1.0), (0.992, 1.0), (1.008, 1.0), (0.98, 0.98)],
+)
 def test_a_shape_of_pixels_that_no_camera_has_is_a_mistake(stated, taken):
+    """Pixels of nearly 1 are squares, whose picture's width was rounded."""
     stream = SimpleNamespace(
         sample_aspect_ratio=stated, average_rate=None, guessed_rate=None, duration=None, index=1,
         codec_context=SimpleNamespace(width=8, height=6),

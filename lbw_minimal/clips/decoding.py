@@ -28,6 +28,7 @@ NO_FILM = {
     b"....ftyphei": "this is a still picture; give a video in which the arm does the task.",
 }
 STILL = "this is a still picture; give a video in which the arm does the task."
+ROUNDED = 0.01  # an editor that shrinks 16:9 to 1066x600 states pixels 1600:1599
 # With more threads a 4K film of 10 bits takes hundreds of megabytes for frames under way.
 THREADS = min(4, os.cpu_count() or 1)
 # A title may be no UTF-8. PyAV 19, for Python 3.12 and later, takes it as it is; 18 has to be told.
@@ -90,6 +91,8 @@ def _open(file):
 def _describe(stream, seconds):
     shape = stream.sample_aspect_ratio
     pixel = float(shape) if shape else 1.0
+    if not 0.2 < pixel < 5 or abs(pixel - 1) < ROUNDED:  # a writer's mistake
+        pixel = 1.0
     rate = float(stream.average_rate or stream.guessed_rate or 25)
     if stream.duration:
         seconds = float(stream.duration * stream.time_base)
@@ -97,7 +100,7 @@ def _describe(stream, seconds):
         stream.index,
         stream.codec_context.width,
         stream.codec_context.height,
-        pixel if 0.2 < pixel < 5 else 1.0,  # beyond it is a writer's mistake
+        pixel,
         rate,
         seconds,
     )
