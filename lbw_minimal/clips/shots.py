@@ -56,6 +56,7 @@ before it should move until the last.</p>
 """
 CUT = """
 <p>Is a part of the clip to be left out? Choose the first or the last picture to use, and click it.
+The next page has as many pictures of what is left, closer together: so a fast hand can be clicked.
 </p>
 """
 ONLY_CUT = """
