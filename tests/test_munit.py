@@ -420,6 +420,8 @@ def test_munits_networks_begin_and_compute_as_for_the_shipped_results(golden):
     x, y, _ = domains(2)
     figures = {"sizes": str(MUNIT().sizes), "layers": layers(MUNIT()), "critic": layers(critic)}
     figures["begin"] = [p.std().item() for p in model.parameters() if p.ndim > 1]
+    apart = MUNIT(3, style_dim=5, blocks=1, shared_content=False)
+    figures["numbers in each"] = [p.numel() for p in apart.parameters()]
     for domain, image in (("x", x), ("y", y)):
         c, s = model.content(image, domain), model.style(image, domain)
         figures |= {f"content {domain}": look(c), f"style {domain}": look(s, 10)}
