@@ -22,6 +22,7 @@ from lbw_minimal.imitate import (
     watched,
 )
 from lbw_minimal.munit import MUNIT
+from lbw_minimal.reward import LAMBDA
 from lbw_minimal.training import InputError
 from lbw_minimal.transporter import Transporter
 from tasks import TASKS, WEIGHTS
@@ -342,3 +343,8 @@ def test_the_time_of_a_stage_is_noted_in_tenths_of_a_second(tmp_path):
         checkpoint._start -= 12.34567
     spent = run.metrics["stages"]["policy"]
     assert spent == round(spent, 1) == pytest.approx(12.3, abs=0.2)
+
+
+def test_the_literal_reward_weighs_as_the_mended_one_does(watcher):
+    assert make_reward(watcher, None, "literal").lam == LAMBDA
+    assert make_reward(watcher, np.zeros((9, 84, 84, 3), np.uint8)).lam == LAMBDA

@@ -140,10 +140,11 @@ def test_a_recording_is_what_the_environment_said():
     env.close()
 
 
-def test_what_is_kept_of_an_action_is_what_was_played_whatever_becomes_of_it():
-    """A policy may give the same array again and again, in double precision."""
+@pytest.mark.parametrize("kind", [np.float64, np.float32])
+def test_what_is_kept_of_an_action_is_what_was_played_whatever_becomes_of_it(kind):
+    """A policy may give the same array again and again, in single or double precision."""
     env = tasks.bare("reach", observation="state")
-    action, one_third = np.zeros(3), 1 / 3
+    action, one_third = np.zeros(3, kind), 1 / 3
 
     def changing():
         for x in (one_third, -1.0):

@@ -332,3 +332,10 @@ def test_what_is_not_done_at_the_end_is_told_by_how_far(monkeypatch):
         reenact(Table(SCENE), along(0, 1, 2))
     assert "the motion ends 19 cm from the goal" in str(told.value)
     assert "film one steady motion from the start to the goal" in f"{told.value} {vars(told.value)}"
+
+
+def test_a_push_that_was_done_on_the_way_and_is_not_at_the_end_failed(monkeypatch):
+    """A mug that reached its place and fell over later, however near it lies."""
+    end = ended(0.995)
+    rehearsing(monkeypatch, lambda further: end._replace(success=np.array([True, False])))
+    assert module._measured_push(None, None) == (0.0, False)

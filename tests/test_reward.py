@@ -377,7 +377,7 @@ def test_demonstrations_are_made_the_robots_own_as_they_were(golden):
     """Slow and fast robots, pauses cut to several lengths, and few frames or many."""
     z, figures = shown(), {}
     for pace in (0.005, 0.02, 0.2):
-        for horizon in (None, 20, 90):
+        for horizon in (None, 22, 90):
             own = prepare(z, random_walk(3, 60, pace, 4), horizon=horizon)
             figures[f"{pace}, {horizon}"] = [
                 len(own),

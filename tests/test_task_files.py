@@ -321,3 +321,17 @@ def test_an_environment_of_an_own_reward_is_the_tasks(monkeypatch):
     assert (env.unwrapped.jitter, env.unwrapped.embodiment) == (0.02, "human")
     assert env.reset(seed=0)[0].shape == (10,) and env.spec.max_episode_steps == 50
     env.close()
+
+
+def test_only_a_seed_begins_the_draws_anew():
+    """Episodes without one go on with what is drawn; another environment draws the same."""
+
+    def starts():
+        env = tasks.bare("push", observation="state", jitter=0.05)
+        seen = [env.reset(seed=3)[0], env.reset()[0], env.reset()[0], env.reset(seed=0)[0]]
+        env.close()
+        return np.array(seen)
+
+    first = starts()
+    np.testing.assert_array_equal(first, starts())
+    assert len(np.unique(first, axis=0)) == 4
