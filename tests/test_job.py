@@ -1,5 +1,6 @@
 """What a run is asked to do, piece by piece: folders, settings, files, numbers."""
 
+import hashlib
 import json
 from argparse import Namespace
 from types import SimpleNamespace
@@ -108,6 +109,7 @@ def test_the_human_videos_are_the_first_of_the_kits_or_the_users_own():
     assert names() == names(method="tracks") == ["expert_01.mp4"]
     assert names(videos=3) == ["expert_01.mp4", "expert_02.mp4", "expert_03.mp4"]
     assert names(method="avid")[-1] == "expert_15.mp4" and len(names(method="avid")) == 15
+    assert len(names(videos=15)) == 15
     assert names(method="avid", videos=1) == ["expert_01.mp4"] and names(method="classifier") == []
     assert names(video=tasks.ROOT / "my.mp4", videos=3) == ["my.mp4"]
     with pytest.raises(InputError, match="push has 15 human videos"):
@@ -327,6 +329,8 @@ def test_what_a_run_reads_and_loads_is_what_it_learns_from(
     assert made.run.metrics["machine"] == f"toy, 6 cores, torch {job.torch.__version__}"
     assert made.run.metrics["version"] == job.__version__ and "clip" not in made.run.metrics
     assert made.run.metrics["command"] == made.command and made.name == "push"
+    digest = hashlib.sha256(b"".join(v.tobytes() for v in made.experts)).hexdigest()
+    assert made.run.metrics["settings"]["video"] == digest[:16]
     assert made.run.metrics["settings"]["seed"] == 5 and made.run.out == tmp_path / "out"
     assert checked == [(tasks.WEIGHTS / "push", "push", "lbw")] * ("--evaluate" in argv)
 

@@ -340,8 +340,8 @@ def test_a_file_of_triangles_is_read_as_it_was(tmp_path):
     record = np.zeros(2, np.dtype([("n", "<f4", 3), ("v", "<f4", (3, 3)), ("more", "<u2")]))
     record["n"], record["v"] = 7, square
     data = b"t" * 80 + np.uint32(2).tobytes() + record.tobytes()
-    (tmp_path / "square.stl").write_bytes(data)
-    np.testing.assert_array_equal(read_mesh(tmp_path / "square.stl"), square)
+    (tmp_path / "square.STL").write_bytes(data)
+    np.testing.assert_array_equal(read_mesh(tmp_path / "square.STL"), square)
     for short in (data[:-1], data[:82], data + b"0"):
         (tmp_path / "cut.stl").write_bytes(short)
         with pytest.raises(ValueError, match=r"cut\.stl: not a binary STL file; export"):
