@@ -427,3 +427,11 @@ def test_what_is_no_trajectory_is_named_with_what_to_give():
         f"robot keypoints of shape {shape}: give (M, 2, 2), M >= 3." for shape in shapes
     ]
     np.testing.assert_array_equal(LiteralReward(np.zeros((3, 1, 2)))(*np.zeros((2, 1, 2)))[0], 0)
+
+
+def test_two_frames_stay_two_and_never_become_one():
+    """What is left of a demonstration in which only the first frame and the last one differ."""
+    z = line(0, 1)
+    np.testing.assert_array_equal(resample(z, 9.0, 40), z)
+    np.testing.assert_array_equal(resample(line(0, 0, 1), np.inf, 2), z)
+    assert len(prepare(line(0, 0, 0, 0, 0, 1), line(*range(9)), trim=True)) >= 2
