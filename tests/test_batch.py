@@ -204,6 +204,9 @@ def test_runs_are_started_logged_and_named_when_they_fail(tmp_path, monkeypatch,
         started.append((line[0], line[1:3], line[3], line[-1], stdout.name))
         return type("Done", (), {"returncode": 4 * (line[3] == "slide")})
 
+    pools = []
+    pool = batch.ThreadPoolExecutor
+    monkeypatch.setattr(batch, "ThreadPoolExecutor", lambda n: pools.append(n) or pool(1))
     monkeypatch.setattr(batch.subprocess, "run", run)
     monkeypatch.setattr(batch.sys, "executable", "py")
     batch.run_missing(out, [("push", 0, "literal")], 1, 5, fast=True)
@@ -218,7 +221,8 @@ def test_runs_are_started_logged_and_named_when_they_fail(tmp_path, monkeypatch,
         f"running push-0; {out / 'push-0'}.log tells how far it is"
     )
     with pytest.raises(InputError) as told:
-        batch.run_missing(out, [("slide", 3, "avid")], 2, 5)
+        batch.run_missing(out, [("slide", 3, "avid")], 7, 5)
+    assert pools == [1, 1, 1, 1, 7]
     path = out / "slide-3-avid"
     assert str(told.value) == f"{path}: the run ended with code 4; see {path}.log."
 
