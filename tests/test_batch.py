@@ -177,7 +177,12 @@ def test_every_run_is_asked_for_as_it_was(tmp_path, monkeypatch, golden):
 
 def test_what_is_missing_is_found_once_and_in_two_rounds(tmp_path):
     """Finished is what has just as many episodes; what a run rests on is missing, too."""
-    for name, episodes in (("push-0", 3), ("push-0-literal", 2), ("reach-1-avid", 3)):
+    for name, episodes in (
+        ("push-0", 3),
+        ("push-0-literal", 2),
+        ("reach-1-avid", 3),
+        ("slide-0-tracks", 4),
+    ):
         (tmp_path / name).mkdir()
         metrics = {"episodes": [{}] * episodes, "stages": {}}
         (tmp_path / name / "metrics.json").write_text(json.dumps(metrics))
