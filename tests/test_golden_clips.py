@@ -255,6 +255,25 @@ def test_arms_come_in_where_they_did(golden):
     golden(figures | {"doors": doors.ravel(), "comes in": few, "at edge": at})  # fmt: skip
 
 
+def test_a_clip_that_was_steadied_is_looked_at_again_and_only_in_its_longest_shot(monkeypatch):
+    looked, frames = [], np.zeros((50, 8, 8, 3), np.uint8)
+    still, steady = np.zeros((3, 84, 84)), frames + 1
+
+    def look_at(shot):
+        looked.append((len(shot), int(shot.max())))
+        return still, still[0], True
+
+    asked = []
+    monkeypatch.setattr(footage, "before_background", look_at)
+    monkeypatch.setattr(footage, "_comes_in", lambda moves: True)
+    monkeypatch.setattr(
+        footage, "_steadied", lambda *of: asked.append(of[1:]) or (steady, ["sways"])
+    )
+    seen = footage.check(frames, [10, 41])
+    assert looked == [(31, 0), (31, 1)] and asked == [([(0, 10), (10, 41), (41, 50)], 1)]
+    assert seen.frames is steady and seen.warnings == ["sways"] and np.isnan(seen.enters)
+
+
 def test_what_stays_changed_is_told_as_it_was(golden):
     """Things of some sizes, which appear in the middle, at an edge, or in the last frames alone."""
     figures = {}
