@@ -1,5 +1,6 @@
 """A clip is read, stood upright and checked as it was when the shipped results were made."""
 
+import contextlib
 from types import SimpleNamespace
 
 import av
@@ -7,8 +8,9 @@ import cv2
 import numpy as np
 import pytest
 
-from lbw_minimal.clips import footage, hdr, lookalike, reader, stills, upright
+from lbw_minimal.clips import decoding, footage, hdr, lookalike, reader, stills, upright
 from lbw_minimal.clips.decoding import Decoder, Stream, look
+from lbw_minimal.training import InputError
 from tests.toy_chance import cells
 from tests.toy_clips import add, add_sound, arm, encode, reach, room
 
@@ -145,9 +147,55 @@ def test_a_file_of_several_streams_is_described_as_it_was(tmp_path, golden):
     (longer,), _ = look(tmp_path / "a.avi")
     decoder = Decoder(tmp_path / "a.avi", longer)
     figures["avi"] = [len(list(decoder)), longer.seconds, decoder.promised, decoder.covered]
+    with av.open(str(tmp_path / "a.mkv"), "w") as out:  # its pictures begin after its sound
+        packets = add_sound(out, 2.0) + add(out, reach(20), "mpeg4", 25, 0.4 + np.arange(20) / 25)
+        for packet in sorted(packets, key=lambda packet: packet.pts * packet.time_base):
+            out.mux(packet)
+    (late,), _ = look(tmp_path / "a.mkv")
+    figures["begins late"] = [time for time, _ in Decoder(tmp_path / "a.mkv", late)][::5]
     decoder = Decoder(path, streams[0])
     figures["decoded"] = [len(list(decoder)), decoder.packets, decoder.covered, decoder.promised]
     golden(figures | {"notes": clip.notes, "shape": clip.frames.shape}, atol=1e-3)
+
+
+def test_a_stream_without_a_size_is_no_film_unless_there_is_no_other(monkeypatch, tmp_path):
+    def stream(index, width, height):
+        return SimpleNamespace(
+            index=index, disposition=0, sample_aspect_ratio=None, average_rate=25, duration=None,
+            codec_context=SimpleNamespace(width=width, height=height),
+        )  # fmt: skip
+
+    def told(*streams):
+        whole = SimpleNamespace(
+            format=SimpleNamespace(name="mov"), streams=SimpleNamespace(video=streams, audio=()),
+            duration=3_000_000, metadata={"a": "b"},
+        )  # fmt: skip
+        monkeypatch.setattr(decoding, "_open", lambda file: contextlib.nullcontext(whole))
+        found, said = look(tmp_path / "a.mp4")
+        assert said == {"a": "b"} and {one.seconds for one in found} == {3.0}
+        return [one.index for one in found]
+
+    (tmp_path / "a.mp4").write_bytes(bytes(range(256)))
+    assert told(stream(0, 0, 6), stream(1, 8, 6), stream(2, 8, 0)) == [1]
+    assert told(stream(0, 0, 6), stream(1, 0, 0)) == [0, 1]
+
+
+@pytest.mark.parametrize(("covered", "refused"), [(0.82, False), (0.78, True)])
+def test_of_a_short_film_a_frame_and_a_tenth_of_a_second_may_be_missing(covered, refused):
+    """At 10 frames a second."""
+    film = reader._Film("a.mp4", Stream(0, 8, 6, 1.0, 10.0, 1.0), None, None, None, True)
+    decoder = SimpleNamespace(promised=1.0, covered=covered, packets=8)
+    with (
+        pytest.raises(InputError, match=r"promises 1\.0 s and 0\.8 s can")
+        if refused
+        else (contextlib.nullcontext())
+    ):
+        film._check(decoder, 8, True)
+
+
+def test_a_text_that_ends_within_a_letter_is_text():
+    text = ("Där Arm schiebt. " * 9 + "ä").encode()
+    assert decoding._is_text(text[:-1]) and not decoding._is_text(text[:-1] + b"\xff\x00")
 
 
 def boxed(n=50):
@@ -280,9 +328,10 @@ def test_what_stays_changed_is_told_as_it_was(golden):
     for side in (4, 5, 6, 7, 20):
         for where in (2, 30):
             for last in (1, 2, 3, 40):
-                still = np.zeros((40, 84, 84), np.float32)
-                still[-last:, 30 : 30 + side, where : where + side] = 40
-                figures[f"{side} {where} {last}"] = footage._unmoved(still)
+                for n in (20, 40):
+                    still = np.zeros((n, 84, 84), np.float32)
+                    still[-last:, 30 : 30 + side, where : where + side] = 40
+                    figures[f"{side} {where} {last} {n}"] = footage._unmoved(still)
     golden({"unmoved": "".join("01"[one] for one in figures.values())})
 
 

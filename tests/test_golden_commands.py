@@ -191,6 +191,8 @@ def test_a_film_of_the_kits_own_is_told_and_taken_as_it_was(golden):
             )
             clip = Clip(frames, 2 + np.arange(6) * step, [], [])
             figures[f"{step} {off}"] = prepare.is_own(clip, first)
+    wide = first.repeat(2, axis=1)[None].repeat(6, axis=0)  # squeezed it would look the same
+    assert not prepare.is_own(Clip(wide, np.arange(6) / 25, [], []), first)
     result = prepare.Prepared(Clip(arm(np.linspace(0.2, 0.7, 9)), 3 + np.cumsum(
         [0, 0.05, 0.03, 0.04, 0.06, 0.02, 0.04, 0.04, 0.05]), [], []), "scene")  # fmt: skip
     prepare.take_as_it_is(result)

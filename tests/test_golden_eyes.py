@@ -333,7 +333,8 @@ def test_patches_are_looked_for_and_chosen_as_they_were(pushed, golden):
     mend = patches.mended(shots, Found(*map(np.concatenate, both)), (32,))
     small, figures = patches.shrunk(frames[::2], 0.8), {}
     tip = patches._tip(found, np.arange(0, 32, 2), 0.8)
-    some = patches.paths(small, [(0, 0.8 * thing[0]), (15, 0.8 * thing[30]), (4, (3.0, 30))], tip)
+    places = [(0, 0.8 * thing[0]), (15, 0.8 * thing[30]), (4, (3.0, 30)), (2, (159.0, 95))]
+    some = patches.paths(small, places, tip)
     for i, path in enumerate(some):
         figures[f"path {i}"] = [*path.places[::2].ravel(), path.side]
         figures[f"is {i}"] = [path.way, path.start, path.alone, path.worth, path.seen, path.pushed]

@@ -92,6 +92,40 @@ def test_a_scene_elsewhere_gets_the_same_motion_elsewhere(name):
     assert (other.contact, other.arrival) == (one.contact, one.arrival)
 
 
+@pytest.mark.parametrize("name", ["push", "hit"])
+def test_where_on_the_hand_the_tip_is_seen_matters_to_nothing(name):
+    """A knuckle, 30 pixels higher and 11 behind."""
+    same(*laid(*WORLDS[name], lambda clip: replace(clip, tip=clip.tip + (-11, -30))))
+
+
+def a_motion(n, goes=0.01):
+    x = np.arange(n) * goes
+    return retarget.Motion(np.stack([x, 0 * x], 1), np.stack([2 * x, 0 * x], 1), np.arange(n) / 25,
+                           2, n - 1, np.eye(3)[:2], False)  # fmt: skip
+
+
+def test_a_motion_is_stretched_step_by_step_and_its_marks_are_rounded():
+    """Its first two steps take 1.7 of the arm's, and so on: the touch is at 1.7, the end at 5.7."""
+    slow = retarget.stretched(a_motion(5), np.array([0.7, 1.0, 1.0, 3.0]))
+    assert (slow.contact, slow.arrival, len(slow.tip)) == (2, 6, 7)
+    at = np.array([0, 1.3, 2.3, 3 + 0.3 / 3, 3 + 1.3 / 3, 3 + 2.3 / 3, 4])
+    np.testing.assert_allclose(slow.tip[:, 0], 0.01 * at)
+    np.testing.assert_allclose(slow.object[:, 0], 0.02 * at)
+    np.testing.assert_allclose(slow.times, at / 25)
+
+
+def test_a_motion_that_is_hurried_keeps_the_proportions_of_its_steps(monkeypatch):
+    """Of 1,000 small steps and one for which the arm takes several."""
+    steps, motion = [], a_motion(1001, 1e-5)
+    motion.tip[500:] += 10 * SCENE.step
+    monkeypatch.setattr(retarget, "stretched", lambda motion, slow: steps.append(slow))
+    retarget.pace(motion, SCENE)
+    (slow,) = steps
+    assert slow[499] / slow[0] == pytest.approx(10 / retarget.HURRY, rel=0.01)
+    assert np.ptp(np.delete(slow, 499)) < 1e-9
+    assert slow.sum() == pytest.approx(retarget.LONGEST * retarget.FPS, abs=1)
+
+
 @pytest.mark.parametrize("seed", range(5))
 def test_the_map_takes_the_ways_ends_to_the_scenes_and_scales_both_axes_alike(seed):
     rng = np.random.default_rng(seed)
@@ -136,6 +170,7 @@ def test_marks_correct_a_clip_that_runs_backwards_alike(seed):
     for x, y, s in marks:
         assert one.tip[np.abs(one.times - s).argmin()] == pytest.approx((x, y))
     np.testing.assert_array_equal(one.object, clip.object)
+    assert one.yours == (("tip", marks[0][2], marks[-1][2]),)
     moved = replace(clip, tip=clip.tip + (5, -3)).marked(
         "tip", [(x + 5, y - 3, s) for x, y, s in marks]
     )
@@ -213,6 +248,21 @@ def test_a_camera_that_turns_zooms_and_shifts_at_once_is_followed_and_so_in_a_mi
     way = camera.extent(camera.sway(frames), 120, 160)
     assert way == pytest.approx(np.ptp(undone, axis=0).max() / 160, abs=0.005)
     assert way == pytest.approx(camera.extent(camera.sway(frames[:, ::-1]), 120, 160), abs=0.005)
+
+
+def test_a_larger_picture_moves_by_more_pixels_and_is_asked_by_as_many_cells():
+    frames, _ = shaken()
+    large = np.stack([cv2.resize(frame, (480, 360)) for frame in frames])
+    one, other = camera.sway(frames), camera.sway(large)
+    corners = np.array([(0, 0, 1), (160, 0, 1), (0, 120, 1), (160, 120, 1)], float).T
+    np.testing.assert_allclose(other @ ((3, 3, 1) * corners.T).T / 3, one @ corners, atol=0.4)
+    for shape in ((120, 160), (160, 120), (90, 240)):
+        wall = cv2.resize(frames[0], shape[::-1])
+        picture = camera._Picture(wall, camera.FINE)
+        votes = picture.votes(camera._plain(wall, picture.size), np.eye(3))
+        larger, smaller = max(shape), min(shape)
+        cells = camera.CELLS, round(camera.CELLS * smaller / larger)
+        assert votes.shape == (cells if shape[0] == larger else cells[::-1]) and not votes.any()
 
 
 def test_an_arm_comes_in_from_the_other_side_in_a_mirror():
