@@ -330,7 +330,7 @@ def test_what_stays_changed_is_told_as_it_was(golden):
             for last in (1, 2, 3, 40):
                 for n in (20, 40):
                     still = np.zeros((n, 84, 84), np.float32)
-                    still[-last:, 30 : 30 + side, where : where + side] = 40
+                    still[-last:, 30 : 30 + side, where : where + side] = 30
                     figures[f"{side} {where} {last} {n}"] = footage._unmoved(still)
     golden({"unmoved": "".join("01"[one] for one in figures.values())})
 
