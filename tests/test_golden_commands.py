@@ -12,7 +12,7 @@ from lbw_minimal.clips.detector import Found
 from lbw_minimal.clips.footage import Footage
 from lbw_minimal.clips.reader import Clip
 from lbw_minimal.training import InputError
-from tasks.commands import prepare, probe, run
+from tasks.commands import eyes, prepare, probe, run
 from tasks.commands.choices import Choices
 from tests.toy_chance import cells
 from tests.toy_clips import arm
@@ -148,6 +148,28 @@ def test_a_robots_film_is_of_the_runs_seed_and_its_seconds_are_noted(monkeypatch
     monkeypatch.setattr(run.tasks, "pace_film", lambda *of: of)
     assert run.film_robot(job, 55) == ("push", 6, 55)
     assert job.run.metrics["stages"] == {"robot_video": 2.3}
+
+
+def test_what_is_told_of_a_training_of_eyes(tmp_path, monkeypatch):
+    """Of four cores three learn and one draws; the seconds are whole."""
+    asked, threads = [], []
+    model = SimpleNamespace(save=asked.append)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(eyes.os, "cpu_count", lambda: 4)
+    monkeypatch.setattr(eyes.torch, "set_num_threads", threads.append)
+    monkeypatch.setattr(eyes.platform, "machine", lambda: "a laptop")
+    monkeypatch.setattr(eyes, "Checkpoint", lambda path: SimpleNamespace(path=path, spent=12.6))
+    monkeypatch.setattr(eyes.detector, "train", lambda **how: asked.append(how) or (model, ["row"]))
+    told = eyes.learn(30, 4, tmp_path / "eyes.safetensors", "cpu")
+    (how, saved), kept = asked, asked[0].pop("checkpoint")
+    assert kept.path.as_posix() == "runs/eyes-4.checkpoint" and threads == [3]
+    assert how == {"iterations": 30, "seed": 4, "device": "cpu", "workers": 1}
+    assert saved == tmp_path / "eyes.safetensors"
+    assert told.pop("machine") == f"a laptop, 4 cores, torch {torch.__version__}"
+    assert json.dumps(told) == json.dumps({
+        "command": "python -m tasks eyes --iterations 30 --seed 4", "seed": 4, "iterations": 30,
+        "seconds": 13, "log": ["row"],
+    })  # fmt: skip
 
 
 # A clip on its way

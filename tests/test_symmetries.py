@@ -219,6 +219,14 @@ def test_what_moves_and_jumps_is_the_same_in_a_mirror(flip):
     assert moves and too
 
 
+@pytest.mark.parametrize(("share", "found"), [(0.9, []), (1.2, [21])])
+def test_what_more_than_half_of_the_frames_do_is_motion_and_no_noise(share, found, monkeypatch):
+    residual = np.where(np.arange(30) < 12, 0, 1.0)
+    residual[20] = share * motion.JUMP
+    monkeypatch.setattr(motion, "_unexplained", lambda frames, size: (residual, residual))
+    assert motion.jumps(np.zeros((31, 8, 8, 3), np.uint8), np.arange(31) / 25) == found
+
+
 def shaken():
     """A wall that turns by up to 2 degrees, grows by 3 % and goes by (4, -2) pixels."""
     wall = cv2.GaussianBlur(room(120, 160, 1), (0, 0), 1.2)
