@@ -54,7 +54,7 @@ def read(path: Path | str, whole: bool = False) -> tuple[np.ndarray, list[str]]:
     if len(frames) > MAX_FRAMES:
         every = -(-len(frames) // MAX_FRAMES)
         count, frames = len(frames), frames[::every]
-        warnings.append(f"{count} frames are many; every {every}th is used, {len(frames)} in all.")
+        warnings.append(f"{count} frames are many; one in {every} is used, {len(frames)} in all.")
     still, background, moving = before_background(frames)
     if not moving:
         raise InputError(

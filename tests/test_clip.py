@@ -262,7 +262,7 @@ def test_a_long_film_is_read_where_it_moves(tmp_path, monkeypatch):
 def test_memory_does_not_grow_with_the_length(tmp_path, monkeypatch):
     monkeypatch.setattr(clips, "MOST", 20 * H * W * 3)
     clip = read_clip(encode(tmp_path / "a.mp4", reach(100)), start=0, end=10)
-    assert len(clip.frames) <= 20 and "100 frames are many; every 8th is used" in clip.losses[0]
+    assert len(clip.frames) <= 20 and "100 frames are many; one in 8 is used" in clip.losses[0]
     assert shows(clip.frames, reach(100)[::8]) < 8 and clip.cuts == []
 
 
@@ -467,4 +467,4 @@ def test_a_film_is_thinned_by_halves_until_it_fits(tmp_path, monkeypatch):
     clip = read_clip(path)
     assert clip.times == pytest.approx(np.arange(0, 50, 4) / 25, abs=1e-3)
     assert shows(clip.frames, reach(50)[::4]) < 8
-    assert clip.losses == ["50 frames are many; every 4th is used, 13 in all."]
+    assert clip.losses == ["50 frames are many; one in 4 is used, 13 in all."]

@@ -210,7 +210,7 @@ def test_long_video_is_thinned_evenly_and_says_so(tmp_path, monkeypatch):
     video.write(tmp_path / "mine.mp4", film(35), 25)
     frames, warnings = video.read(tmp_path / "mine.mp4")
     assert len(frames) == 9 and np.abs(frames.astype(float) - film(35)[::4]).mean() < 5
-    assert "35 frames are many; every 4th is used, 9 in all." in warnings[0]
+    assert "35 frames are many; one in 4 is used, 9 in all." in warnings[0]
 
 
 @pytest.mark.parametrize("fps", [10, 60])
@@ -317,7 +317,7 @@ def test_all_that_is_odd_about_a_video_is_told_in_order(tmp_path, monkeypatch):
         "my.mp4: it lost a thing.",
         "my.mp4: it jumps at 0.2 s, 0.3 s, 0.5 s, 0.6 s, 0.7 s; the longest of 7 pieces is used, "
         "0.6 of 1.4 s.",
-        "my.mp4: 15 frames are many; every 3th is used, 5 in all.",
+        "my.mp4: 15 frames are many; one in 3 is used, 5 in all.",
         "my.mp4: the camera seems to move; put it on a stand, or keypoints will follow it.",
     ]
     video.read("my.mp4", whole=True)

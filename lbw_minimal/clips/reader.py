@@ -224,7 +224,7 @@ class _Film:
         if decoder.bad:
             self.losses.append("Damaged places were left out.")
         if every > 1:
-            many = f"{count} frames are many; every {every}th is used, {len(kept)} in all."
+            many = f"{count} frames are many; one in {every} is used, {len(kept)} in all."
             self.losses.append(many)
 
     def _check(self, decoder, count, whole):
