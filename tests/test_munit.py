@@ -447,7 +447,7 @@ def test_a_first_update_of_munit_has_the_losses_and_gradients_it_had(weighted, e
 
 
 def test_three_steps_of_munits_training_go_where_they_went(exact, golden, monkeypatch):
-    """Losses, how far off the mean images are, and how far all weights have moved in each step."""
+    """Losses, how far off the mean images are, and how far all weights have moved in the end."""
     monkeypatch.setattr(munit, "LOG_EVERY", 1)
     kept, bar = Kept(), Bar(monkeypatch, munit)
     films = blocks(5, 5, 0, 200), blocks(4, 6, 60, 256)
