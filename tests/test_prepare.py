@@ -1,12 +1,14 @@
 """`python -m tasks prepare`: a filmed clip goes in, a page, a film and a verdict come out."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from toy_clips import shows
 
 from lbw_minimal import tracks, video
+from lbw_minimal.clips import page
 from lbw_minimal.clips.detector import Found
 from lbw_minimal.clips.footage import Footage
 from lbw_minimal.clips.page import write_page
@@ -208,6 +210,22 @@ def test_the_page_is_safe_from_the_names_of_files(scene, tmp_path):
     )  # fmt: skip
     page = (tmp_path / "page.html").read_text()
     assert not [tag for tag in ("<b>.mp4", "<i>", "<u>", "<s>") if tag in page]
+
+
+def test_the_films_play_at_half_the_speed_of_what_is_shown(scene, tmp_path, monkeypatch):
+    """Every second of 25 steps a second is 12.5 frames a second, of which half is 6.25."""
+    asked = []
+    film = SimpleNamespace(html=lambda: "")
+    monkeypatch.setattr(page, "Film", lambda films, fps: asked.append(fps) or film)
+    small, z = np.zeros((4, 84, 84, 3), np.uint8), np.full((4, 6, 2), 40.0)
+    for every in (1, 2):
+        write_page(
+            tmp_path / "page.html", task="push", command="", verdict="usable", scene=scene,
+            frames=np.zeros((9, 90, 120, 3), np.uint8), times=np.arange(9) / 25, notes=[],
+            warnings=[], columns=(small, small, z), shown=every * np.arange(4),
+        )  # fmt: skip
+    assert asked == [12.5, 6.25]
+    assert "At half speed" in (tmp_path / "page.html").read_text()
 
 
 def test_reasons_are_sentences():
