@@ -78,14 +78,16 @@ def looks(env, k):
 
 @every_task
 def test_the_scene_looks_as_it_did(name, make, golden):
-    """Means of 6 x 6 fields of a picture, of the start and of a step later."""
+    """Means of 6 x 6 fields of a picture, a step after a start."""
     figures = {}
     for arm in ARMS:
         env = make(name, arm)
         env.reset(seed=1)
         env.step(np.array([1.0, 0, -1]))
         picture = env.world.render()
-        figures[arm] = picture.reshape(6, 14, 6, 14, 3).mean((1, 3)).round(1)
+        fields = picture.reshape(6, 14, 6, 14, 3).mean((1, 3)).round(1)
+        # where the human's scene is the robot's in other colours, some of its fields are enough
+        figures[arm] = fields if arm == "robot" or name == "coffee" else fields[::2, ::2]
         figures[f"{arm}'s edges"] = digest(np.abs(np.diff(picture.astype(float), axis=1)))
         figures[f"{arm}'s places"] = env.true_pixels()
     golden(figures, atol=0.1)
@@ -100,7 +102,7 @@ def test_starts_are_drawn_as_they_were(name, golden):
         jittered = [env.reset(seed=seed)[0][:6] for seed in range(4)]
         options = {"scatter": True}
         anywhere = [env.reset(seed=seed, options=options)[0][[0, 2, 3]] for seed in range(16)]
-        figures[f"{arm}, moved"] = short(jittered)
+        figures[f"{arm}, moved"] = short(jittered if arm == "robot" else jittered[:2])
         figures[f"{arm}, anywhere"] = short(anywhere)
         figures[f"{arm}, drawn next"] = env.np_random.random()
         env.close()

@@ -339,7 +339,7 @@ def test_frames_are_taken_as_they_were(tmp_path, monkeypatch, golden):
         found, _ = video.read("my.mp4")
         assert found.shape[1:] == (84, 84, 3) and found.dtype == np.uint8
         figures[f"{name}: frames"] = len(found)
-        figures[f"{name}: by frame"] = found.mean((1, 2, 3)).round(2)
+        figures[f"{name}: by frame"] = found.mean((1, 2, 3))[::3].round(2)
         figures[f"{name}: by place"] = found[3].reshape(6, 14, 6, 14, 3).mean((1, 3))[::2, :, 0]
     golden(figures, atol=0.1)
 
