@@ -358,3 +358,18 @@ def test_only_a_scattered_start_is_moved_out_of_contact(monkeypatch):
     np.testing.assert_array_equal(env.reset(seed=0)[0], before)
     assert env.reset(seed=0, options={"scatter": True})[0][0] == pytest.approx(0.43, abs=1e-4)
     env.close()
+
+
+@pytest.mark.parametrize(
+    ("x", "z", "moved"), [(0.471, 0.124, True), (0.471, 0.126, False), (0.467, 0.124, False)]
+)
+def test_a_tip_that_would_start_in_the_drawer_is_put_before_it(x, z, moved):
+    """Open by 15 cm its handle begins at 49.3 cm; 2 cm above its front there is room."""
+    env = tasks.bare("drawer", observation="state")
+    env.reset(seed=0)
+    env.np_random = SimpleNamespace(uniform=lambda low, high: low)
+    env.arm.reset(np.array([x, 0, z]))
+    env.place(np.zeros(3), True)
+    assert env.object_position()[0] == pytest.approx(0.493)
+    assert env.arm.goal.tolist() == pytest.approx([0.43 if moved else x, 0, z])
+    env.close()
