@@ -435,3 +435,11 @@ def test_two_frames_stay_two_and_never_become_one():
     np.testing.assert_array_equal(resample(z, 9.0, 40), z)
     np.testing.assert_array_equal(resample(line(0, 0, 1), np.inf, 2), z)
     assert len(prepare(line(0, 0, 0, 0, 0, 1), line(*range(9)), trim=True)) >= 2
+
+
+def test_the_last_step_is_one_of_the_demonstrations_even_where_its_goal_is_left_out():
+    """Steps of 1, 1 and 3: one of 3 is the demonstration's own, wherever it is made."""
+    z = line(0, 1, 2, 5)
+    switches = dict.fromkeys(("trim", "speed", "include_goal", "timed"), False)
+    _, parts = MendedReward(z, z, **switches)(line(0)[0], line(3)[0])
+    assert parts["r2"] == 0

@@ -407,3 +407,14 @@ def test_what_an_environment_refuses_it_refuses_in_its_words():
         "jitter=-0.001: give metres, from 0 to 0.05.",
         "jitter='far': give metres, from 0 to 0.05.",
     ]
+
+
+def test_in_each_of_ten_simulation_steps_the_arm_is_driven_and_then_held_back(make, monkeypatch):
+    env, done = make("reach"), []
+    env.reset(seed=0)
+    monkeypatch.setattr(env.arm, "prepare", lambda: done.append("prepared"))
+    monkeypatch.setattr(env.arm, "actuate", lambda: done.append("driven"))
+    monkeypatch.setattr(env.arm, "brake", lambda: done.append("held"))
+    monkeypatch.setattr(env, "move", lambda: done.append("moved"))
+    env.step(np.zeros(3))
+    assert done == ["moved", "prepared", *10 * ["driven", "held"]]
