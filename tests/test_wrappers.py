@@ -226,7 +226,7 @@ def demonstrated(n=9):
 
 @pytest.mark.parametrize("form", ["mended", "untimed", "literal"])
 def test_an_episode_is_told_and_paid_as_it_was(form, golden):
-    z = demonstrated()
+    z = demonstrated(25)
     switches = {"trim": False, "timed": form == "mended"}
     reward = LiteralReward(z) if form == "literal" else MendedReward(z, z, **switches)
     env = KeypointRewardWrapper(KeypointObservation(Tells(), eye), reward)
