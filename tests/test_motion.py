@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from lbw_minimal.clips import motion
-from lbw_minimal.clips.motion import before_background, differs, high_pass, jumps, moves
+from lbw_minimal.clips.motion import before_background, differs, high_pass, jumps, moves, told
 
 
 def ground(side=84, seed=0):
@@ -50,6 +50,15 @@ def test_at_most_sixty_frames_are_looked_at_from_first_to_last():
     some = motion.some(np.arange(200))
     assert len(some) == 60 and (some[0], some[-1]) == (0, 199)
     assert len(motion.some(np.arange(20))) == 20
+
+
+def test_a_frame_is_told_from_the_last_that_was_however_slowly_a_thing_moves():
+    """A square of 10 pixels goes a pixel a frame. One step changes 20 pixels enough, two 40."""
+    frames = np.full((6, 84, 84, 3), 60, np.uint8)
+    for t, x in enumerate([20, 21, 22, 23, 23, 23]):
+        frames[t, 40:50, x : x + 10] = 106
+    assert told(frames).tolist() == [0, 2]
+    assert told(frames[:1]).tolist() == [0]
 
 
 def test_an_even_motion_has_no_jump_and_one_that_leaves_a_piece_out_has_one():

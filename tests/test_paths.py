@@ -89,13 +89,14 @@ def test_what_was_not_sure_in_another_piece_is_not_said():
     assert "from 2.0 to 2.8 s: look at these pictures." in said
 
 
-@pytest.mark.parametrize(("touched", "last"), [(False, 25), (True, 27)])
-def test_a_piece_ends_where_the_hand_or_what_it_touched_is_last_seen(touched, last):
+@pytest.mark.parametrize(("touched", "first", "last"), [(False, 5, 25), (True, 3, 27)])
+def test_a_piece_is_that_in_which_the_hand_or_what_it_touched_is_seen(touched, first, last):
     sure = np.ones(30)
     sure[:5], sure[10:12], sure[-4:] = 0.4, 0.4, 0.4
-    hit = np.where(np.arange(30) < 28, 1.0, 0.4)  # it goes on by itself for two frames
+    t = np.arange(30)
+    hit = np.where((t >= 3) & (t < 28), 1.0, 0.4)  # it is there before, and goes on by itself
     piece = longest_piece(replace(tracks(np.arange(30), sure=sure), object_sure=hit), touched, [])
-    assert (piece.times[0], piece.times[-1]) == (5 / 25, last / 25)
+    assert (piece.times[0], piece.times[-1]) == (first / 25, last / 25)
 
 
 @pytest.mark.parametrize(("jump", "is_cut"), [(3, False), (5, True)])
@@ -144,7 +145,7 @@ def test_a_change_of_the_picture_is_a_cut_where_the_hand_is_not_seen():
 
 
 def test_enough_frames_have_to_be_sure_and_only_those_count():
-    """Half of them of the object, which a hand hides for a while; of the tip 30 %."""
+    """Half of them of the object, which a hand hides for a while; of the tip one."""
     sure = np.tile([0.6, 0.3], 10)
     x = np.where(sure > 0.5, 2.0 * np.arange(20), 500)
     times, points = trusted(tracks(x, sure=sure), "tip")
@@ -153,10 +154,10 @@ def test_enough_frames_have_to_be_sure_and_only_those_count():
     sure[0] = 0.3
     with pytest.raises(Unusable, match="seen in 45% of the frames"):
         trusted(tracks(x, sure=sure), "object")
-    sure[:8] = 0.3
-    assert len(trusted(tracks(x, sure=sure), "tip")[0]) == 6
-    sure[8] = 0.3
-    with pytest.raises(Unusable, match="tip of the hand is seen in 25%"):
+    sure[:18] = 0.3
+    assert len(trusted(tracks(x, sure=sure), "tip")[0]) == 1
+    sure[18] = 0.3
+    with pytest.raises(Unusable, match="tip of the hand is seen in 0%"):
         trusted(tracks(x, sure=sure), "tip")
 
 

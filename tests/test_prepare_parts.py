@@ -138,7 +138,23 @@ def test_patches_mend_what_the_shipped_detector_finds_and_corners_refine_it(monk
     monkeypatch.setattr(prepare, "mended", mended)
     monkeypatch.setattr(prepare, "refine", lambda seen, found, cuts: (cuts, seen is frames, found))
     assert prepare.look(frames, [1]) == ([1], True, ([10, 11], [10, 11], [1], True))
-    assert prepare.look(frames)[2][0] == [20, 21]
+    assert prepare.look(frames)[2][1] == [20, 21]
+
+
+@pytest.mark.parametrize(("surer", "thing"), [(2, [20, 20, 20, 21, 21]), (5, [50, 51, 52, 53, 54])])
+def test_the_tip_is_told_by_what_moves_and_the_object_by_the_surer_look(surer, thing):
+    """Of five frames two show something new: what stands moves at the fourth. A place is the
+    number of a frame among those that are seen, and ten times how many these are."""
+    frames = np.zeros((5, 84, 84, 3), np.uint8)
+    frames[:3, 40:50, 20:30] = frames[3:, 40:50, 50:60] = 200
+
+    def detect(seen):
+        n = len(seen)
+        return Found(*[np.arange(n) + 10 * n] * 2, np.full(n, 0.1 * n), np.full(n, n == surer))
+
+    found = prepare.looked(SimpleNamespace(detect=detect), frames)
+    assert found.tip.tolist() == [20, 20, 20, 21, 21] and (found.tip_sure == 0.2).all()
+    assert found.object.tolist() == thing and found.object_sure.all()
 
 
 @pytest.mark.parametrize(

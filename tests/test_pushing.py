@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from lbw_minimal.clips.paths import Unusable
-from lbw_minimal.clips.pushing import check_way, gets_faster
+from lbw_minimal.clips.paths import Tracks, Unusable
+from lbw_minimal.clips.pushing import check_hand, check_way, gets_faster
 
 TOUCH, THERE, N = 20, 40, 50
 WAY = np.clip((np.arange(N) - TOUCH) / (THERE - TOUCH), 0, 1)
@@ -70,17 +70,55 @@ def test_what_leaves_its_straight_way_by_a_fifth_between_touch_and_arrival_is_li
         pushed(tip=COMES, aside=aside)
 
 
-@pytest.mark.parametrize(
-    ("enters", "why"), [(0.1, "hides it"), (0.5, "in front of it"), (np.nan, "in front of it")]
-)
+@pytest.mark.parametrize("enters", [0.5, np.nan])
 @pytest.mark.parametrize(("ahead", "usable"), [(0.24, True), (0.26, False)])
-def test_a_tip_a_quarter_of_the_way_ahead_does_not_push(ahead, usable, enters, why):
+def test_a_tip_a_quarter_of_the_way_ahead_does_not_push(ahead, usable, enters):
     tip = np.where(np.arange(N) < TOUCH, -0.5, ahead)
     if usable:
         pushed(tip=tip, enters=enters)
     else:
-        with pytest.raises(Unusable, match=why):
+        with pytest.raises(Unusable, match="in front of it"):
             pushed(tip=tip, enters=enters)
+
+
+def test_what_goes_away_from_the_edge_of_the_arm_is_not_pulled_wherever_the_tip_was_seen():
+    pushed(tip=np.full(N, 0.5), enters=0.1)
+    with pytest.raises(Unusable, match="in front of it"):
+        pushed(tip=np.full(N, 0.5), enters=0.5)
+
+
+def hand(ahead, sure):
+    """Check a tip that is so much ahead, in parts of the way, at the 21 steps of a push, and so
+    surely seen."""
+    t, thing = 0.04 * np.arange(21), np.stack([5.0 * np.arange(21), np.full(21, 50.0)], 1)
+    ahead, sure = np.broadcast_to(ahead, 21), np.broadcast_to(sure, 21)
+    tip = thing + 100 * np.stack([ahead, 0 * ahead], 1)
+    check_hand(Tracks(t, tip, thing, sure, sure, 100), t, thing, np.array([100.0, 0.0]))
+
+
+@pytest.mark.parametrize(("surest", "usable"), [(0.49, False), (0.5, True)])
+def test_a_tip_is_surely_seen_at_least_once_while_the_object_moves(surest, usable):
+    sure = np.where(np.arange(21) == 7, surest, 0.2)
+    if usable:
+        hand(-0.1, sure)
+    else:
+        with pytest.raises(Unusable, match="not surely seen while the object moves"):
+            hand(-0.1, sure)
+
+
+@pytest.mark.parametrize(("sure_ahead", "usable"), [(0.39, True), (0.41, False)])
+def test_an_arm_hides_what_its_tip_is_in_front_of_as_far_as_its_places_are_sure(sure_ahead, usable):
+    """Ahead at 15 steps of 21, with 0.4 for sure, that is 6 in all; behind at six, with 1.0."""
+    behind = np.arange(21) < 6
+    told = np.where(behind, -0.1, 0.3), np.where(behind, 1.0, sure_ahead)
+    if usable:
+        hand(*told)
+    else:
+        with pytest.raises(Unusable, match="and hides it"):
+            hand(*told)
+    hand(0.24, 1.0)
+    with pytest.raises(Unusable, match="and hides it"):
+        hand(0.26, 1.0)
 
 
 @pytest.mark.parametrize(

@@ -252,6 +252,20 @@ def test_in_a_reach_what_goes_twice_as_far_as_the_tip_is_the_hand(way, stands_in
     assert of_a_hand(tracks, []).tip[0, 0] == stands_in
 
 
+@pytest.mark.parametrize(("frames", "usable"), [(29, False), (30, True)])
+def test_a_hand_that_reaches_is_seen_in_three_tenths_of_the_frames(frames, usable):
+    scene = replace(SCENE, start=(0.46, 0.12), goal=(0.68, 0.06), tip=(0.46, 0.12), contact=None)
+    t, sure = np.arange(100) / 30, np.zeros(100)
+    sure[np.linspace(0, 99, frames).round().astype(int)] = 1
+    x = np.array([100.0, 300.0]) + jerk(t / 3)[:, None] * [200.0, 90.0]
+    tracks = replace(seen((x, x), t, camera=np.eye(2, 3)), tip_sure=sure, object_sure=0 * sure)
+    if usable:
+        lay(tracks, scene)
+    else:
+        with pytest.raises(Unusable, match="tip of the hand is seen in 29%"):
+            lay(tracks, scene)
+
+
 def test_a_hand_that_goes_back_after_a_reach_has_stayed_at_the_mark():
     """Half a second there, then home again, which the motion does not do."""
     scene = replace(SCENE, start=(0.46, 0.12), goal=(0.68, 0.06), tip=(0.46, 0.12), contact=None)
@@ -289,6 +303,12 @@ def nothing_is_pushed():
 def no_hand():
     tracks = clip()
     return replace(tracks, tip_sure=0 * tracks.tip_sure), "the tip of the hand is seen in 0%"
+
+
+def an_unseen_hand_that_pushes():
+    tracks = clip()
+    moves = (tracks.times > 0.9) & (tracks.times < 2.1)
+    return replace(tracks, tip_sure=np.where(moves, 0.4, 1.0)), "not surely seen while the object"
 
 
 def a_hidden_object():
@@ -363,7 +383,8 @@ def lifted():
     return replace(tracks, object=tracks.object - np.stack([0 * up, up], 1)), "leaves its straight"
 
 
-NOT_USABLE = (nothing_is_pushed, no_hand, a_hidden_object, too_few_frames, short_pieces, from_above,
+NOT_USABLE = (nothing_is_pushed, no_hand, an_unseen_hand_that_pushes, a_hidden_object,
+              too_few_frames, short_pieces, from_above,
               pulled, held_from_the_front, hidden_by_the_arm, drawn_to_the_arm,
               the_hand_taken_for_the_object, broken_off, lifted,
               lifted_by_a_hand_in_front, nothing_stands_elsewhere_in_the_end)  # fmt: skip

@@ -16,7 +16,6 @@ from tests.strangers import FAULTS, Stranger, judged, stranger, trial
 DEVELOPED = 2  # the seed with which prepare was mended
 HELD_BACK, COUNT = 21, 36
 RIGHT = 0.75  # measured: 30 of 36; the goal is 0.95
-LOST = "the present eyes see the resting hand where it is not; those before saw it"
 
 
 @functools.cache
@@ -27,8 +26,7 @@ def developed(i):
 @pytest.mark.parametrize(
     ("i", "kind"),
     [(2, "zoom"), (4, "usable"), (5, "still"), (6, "short"), (9, "usable"),
-     pytest.param(10, "steep", marks=pytest.mark.xfail(reason=LOST, strict=True)),
-     (15, "usable"), pytest.param(18, "usable", marks=pytest.mark.slow)],
+     (10, "steep"), (15, "usable"), pytest.param(18, "usable", marks=pytest.mark.slow)],
 )  # fmt: skip
 def test_the_verdict_is_right(i, kind, tmp_path):
     one = developed(i)

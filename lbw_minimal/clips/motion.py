@@ -69,6 +69,17 @@ def moves(frames: np.ndarray) -> bool:
     return before_background(frames)[2]
 
 
+def told(frames: np.ndarray) -> np.ndarray:
+    """Indices (n,) of the frames (T, H, W, 3) uint8 in which something has moved since the last of
+    them; the first frame is one."""
+    passed = high_pass(np.stack([small(frame) for frame in frames]))
+    kept = [0]
+    for t, one in enumerate(passed):
+        if differs(one, passed[kept[-1]]):
+            kept.append(t)
+    return np.array(kept)
+
+
 def jumps(frames: np.ndarray, times: np.ndarray) -> list[int]:
     """Indices of the frames that do not continue the one before, rising.
 

@@ -17,8 +17,7 @@ SMOOTH = 0.05  # s, sigma of the low-pass; a webcam's frames are 0.1 s apart, a 
 REST = 0.3  # s that are kept of a rest before the hand starts and after the object has arrived
 SURE = 0.5  # a point found with less is as good as not found
 FOUND = 0.5  # share of the frames in which the object has to be found
-# The same of the tip: while it rests it is like its clip's median, and told from that by little.
-# In made clips in which an arm hides it, it is found in a quarter at most; else mostly in 0.6.
+# The same of the tip where nothing is touched: all the motion is its own.
 TIP_FOUND = 0.3
 FADE = 0.5  # s, for which a correction of what was surely found lasts beyond it
 UNSURE = 0.5  # s, longer than a glitch of the detector
@@ -142,8 +141,8 @@ def of_a_hand(tracks: Tracks, notes: list[str]) -> Tracks:
 
 
 def longest_piece(tracks: Tracks, touched: bool, warnings: list[str]) -> Tracks:
-    """The piece between cuts in which most happens, from where the hand is first seen to where
-    hand or object is last seen.
+    """The piece between cuts in which most happens, from where hand or object is first seen to
+    where one of them is last seen. Where nothing is touched, the hand alone counts.
 
     A cut is a frame at which the picture changes all at once, and tip or object jump. Most happens
     where the object goes farthest, or the tip where nothing is touched.
@@ -151,16 +150,15 @@ def longest_piece(tracks: Tracks, touched: bool, warnings: list[str]) -> Tracks:
     cuts = _cuts(tracks)
     pieces = []
     for first, last in zip([0, *cuts], [*cuts, len(tracks.times)], strict=True):
-        seen = first + np.flatnonzero(tracks.tip_sure[first:last] >= SURE)
-        if not len(seen):
-            continue
-        there = first + np.flatnonzero(tracks.object_sure[first:last] >= SURE)
-        end = 1 + (max(seen[-1], there[-1]) if touched and len(there) else seen[-1])
-        if end - seen[0] >= LEAST_FRAMES:
-            pieces.append(tracks.part(seen[0], end))  # a hit thing goes on without the hand
+        sure = tracks.tip_sure[first:last] >= SURE
+        if touched:  # a hit thing goes on without the hand
+            sure |= tracks.object_sure[first:last] >= SURE
+        seen = first + np.flatnonzero(sure)
+        if len(seen) and seen[-1] + 1 - seen[0] >= LEAST_FRAMES:
+            pieces.append(tracks.part(seen[0], seen[-1] + 1))
     if not pieces:
         if (tracks.tip_sure >= SURE).mean() < TIP_FOUND:
-            raise _no_tip(tracks)
+            raise no_tip(tracks)
         raise Unusable(
             f"{len(tracks.times)} frames are too few, even without cuts {LEAST_FRAMES} are needed",
             "film the whole motion in one go, at 10 frames a second or more",
@@ -223,7 +221,8 @@ def _extent(tracks, name):
     return np.linalg.norm(np.ptp(median3(points), axis=0)) if len(points) else 0.0
 
 
-def _no_tip(tracks):
+def no_tip(tracks: Tracks) -> Unusable:
+    """The error for a tip that is too rarely seen."""
     share = (tracks.tip_sure >= SURE).mean()
     return Unusable(
         f"the tip of the hand is seen in {share:.0%} of the clip, and hidden or out of it else",
@@ -234,9 +233,9 @@ def _no_tip(tracks):
 def trusted(tracks: Tracks, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Times and points (n, 2) of the frames in which the tip or the object is surely found."""
     sure = getattr(tracks, f"{name}_sure") >= SURE
-    if sure.mean() < TIP_FOUND and name == "tip":
-        raise _no_tip(tracks)
-    if sure.mean() < FOUND and name == "object":
+    if name == "tip" and not sure.any():
+        raise no_tip(tracks)
+    if name == "object" and sure.mean() < FOUND:
         away = np.linalg.norm(tracks.object - np.median(tracks.object, axis=0), axis=1)
         rests = away < STANDS * tracks.side  # (N,) unsure, and still the same place
         if rests.mean() > FOUND and (sure & ~rests).mean() < ELSEWHERE:

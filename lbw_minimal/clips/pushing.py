@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from lbw_minimal.clips.paths import RESTS, Unusable
+from lbw_minimal.clips.paths import RESTS, SIDE_ON, SURE, Tracks, Unusable, interpolate
 
 LIFTED = 0.2  # of its way: what leaves the straight line by more was picked up
 AHEAD = 0.25  # of its way: a tip so far in front of the object does not push it
@@ -55,17 +55,39 @@ def check_way(
             f"the object leaves its straight way by {np.abs(aside).max():.0%} of its length",
             "push it straight along the table, without lifting it",
         )
+    if from_left or from_right:
+        return
     ahead = (tip - start) @ along / length**2 - way  # (N,) of the way; the tip pushes from behind
     came = np.median(ahead[: max(1, i // 2)]) > AHEAD and ahead[i] > -RESTS
     if came or np.median(ahead[i : j + 1]) > AHEAD:
-        if from_left or from_right:  # and the object goes away from there
-            raise Unusable(
-                "the arm is between the object and the camera, and hides it",
-                "push it from behind, with the hand between it and the edge of the picture",
-            )
         raise Unusable(
             "the object comes towards the arm, or the hand is in front of it",
             "push it away from the arm, with the hand behind it",
+        )
+
+
+def check_hand(tracks: Tracks, t: np.ndarray, thing: np.ndarray, along: np.ndarray) -> None:
+    """Raise Unusable where the arm hides the object: while it moves the tip is never surely seen,
+    or is in front of it.
+
+    t (N,) s, thing (N, 2): the object's pixels from the touch until it is there; along (2,): its
+    way.
+    """
+    tip = interpolate(tracks.times, tracks.tip, t)
+    sure = np.interp(t, tracks.times, tracks.tip_sure)
+    if sure.max() < SURE:
+        raise Unusable(
+            "the tip of the hand is not surely seen while the object moves, and so is hidden or "
+            "out of the picture",
+            SIDE_ON,
+        )
+    ahead = (tip - thing) @ along / (along @ along)  # (N,) of the way; the tip pushes from behind
+    order = np.argsort(ahead)
+    counted = np.cumsum(sure[order])  # where a tip is hardly seen, its place counts little
+    if ahead[order][np.searchsorted(counted, counted[-1] / 2)] > AHEAD:
+        raise Unusable(
+            "the arm is between the object and the camera, and hides it",
+            "push it from behind, with the hand between it and the edge of the picture",
         )
 
 

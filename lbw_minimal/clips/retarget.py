@@ -20,6 +20,8 @@ from lbw_minimal.clips.paths import (
     REST,
     RESTS,
     STANDS,
+    SURE,
+    TIP_FOUND,
     Tracks,
     Unusable,
     ends,
@@ -27,12 +29,13 @@ from lbw_minimal.clips.paths import (
     longest_piece,
     low_pass,
     never_moves,
+    no_tip,
     of_a_hand,
     progress,
     trusted,
     unsure,
 )
-from lbw_minimal.clips.pushing import check_way, gets_faster
+from lbw_minimal.clips.pushing import check_hand, check_way, gets_faster
 
 FPS = 25  # steps a second of the motion, as in the tasks
 CONTACT = 0.12  # of the object's way: by then it is pushed, whatever the tip's pixels say
@@ -99,6 +102,8 @@ def lay(tracks: Tracks, scene: Scene, mirror: bool | None = None) -> Motion:
     tip = thing = low_pass(*trusted(tracks, "tip"), t)  # (N, 2) pixels
     if touched:
         thing = low_pass(*trusted(tracks, "object"), t)
+    elif (tracks.tip_sure >= SURE).mean() < TIP_FOUND:
+        raise no_tip(tracks)
     what, least = ("object", STANDS) if touched else ("hand", LITTLE)
     start, end = ends(thing, least * tracks.side, what)
     gone = float(np.linalg.norm(end - start))
@@ -120,6 +125,7 @@ def lay(tracks: Tracks, scene: Scene, mirror: bool | None = None) -> Motion:
     i, j = (int(np.argmax(way >= share)) for share in (CONTACT if touched else ARRIVED, ARRIVED))
     if touched:
         check_way(tip, thing, way, (i, j), (start, end), tracks.enters)
+        check_hand(tracks, t[i : j + 1], thing[i : j + 1], end - start)
         x, object_ = _push(x, way, scene, warnings)
     else:
         object_ = None

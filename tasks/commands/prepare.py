@@ -22,7 +22,7 @@ import tasks
 from lbw_minimal import imitate, video
 from lbw_minimal.clips import footage
 from lbw_minimal.clips.detector import Detector, Found, refine
-from lbw_minimal.clips.motion import small
+from lbw_minimal.clips.motion import small, told
 from lbw_minimal.clips.page import clip_column, write_page
 from lbw_minimal.clips.patches import mended
 from lbw_minimal.clips.paths import Tracks, Unusable, jumps
@@ -222,11 +222,25 @@ def look(frames: np.ndarray, cuts: Sequence[int] = ()) -> Found:
     The detector looks at each shot by itself: another shot is another camera's.
     """
     model = Detector.load(EYES)
-    shots = [model.detect(frames[a:b]) for a, b in pairwise([0, *cuts, len(frames)])]
+    shots = [looked(model, frames[a:b]) for a, b in pairwise([0, *cuts, len(frames)])]
     found = Found(
         *(np.concatenate([getattr(one, name) for one in shots]) for name in vars(shots[0]))
     )
     return refine(frames, mended(frames, found, cuts), cuts)
+
+
+def looked(model: Detector, frames: np.ndarray) -> Found:
+    """Tip and object in one shot, at which the model looks twice: at all of it, and at the frames
+    in which something has moved; what rests in between stays where it was.
+
+    An arm that rests for most of a shot is in the shot's median, and so looks like the room: the
+    tip is told by what moves. The object rests as well, before or after: the surer look tells it.
+    """
+    whole, kept = model.detect(frames), told(frames)
+    last = np.searchsorted(kept, np.arange(len(frames)), side="right") - 1
+    moving = Found(*(values[last] for values in vars(model.detect(frames[kept])).values()))
+    surer = moving if moving.object_sure.mean() > whole.object_sure.mean() else whole
+    return replace(surer, tip=moving.tip, tip_sure=moving.tip_sure)
 
 
 def stills(result: Prepared) -> np.ndarray:
