@@ -50,7 +50,7 @@ def a_short_film(monkeypatch):
 @pytest.fixture
 def eyes(filmed, monkeypatch):
     """A detector that is told the truth; what it says can be set."""
-    monkeypatch.setattr(prepare, "look", lambda frames, cuts: eyes.found)
+    monkeypatch.setattr(prepare, "look", lambda frames, cuts, touched: eyes.found)
     eyes.found = filmed[1]
     return eyes
 
@@ -266,7 +266,8 @@ def test_what_was_found_is_laid_by_the_clips_shorter_side_cuts_and_marks(monkeyp
     n = 6
     clip = Clip(np.zeros((n, 90, 160, 3), np.uint8), 2 + np.arange(n) / 20, [4], [])
     nothing = Found(np.zeros((n, 2)), np.zeros((n, 2)), np.zeros(n), np.zeros(n))
-    monkeypatch.setattr(prepare, "look", lambda frames, cuts: nothing)
+    touches = []
+    monkeypatch.setattr(prepare, "look", lambda *asked: touches.append(asked[2]) or nothing)
     monkeypatch.setattr(
         prepare.footage,
         "check",
@@ -277,18 +278,21 @@ def test_what_was_found_is_laid_by_the_clips_shorter_side_cuts_and_marks(monkeyp
         "lay",
         lambda *asked: laid.update(zip(("tracks", "scene", "mirror"), asked, strict=True)),
     )
-    result = Prepared(clip, "scene")
+    scene, reach = SimpleNamespace(contact=0.04), SimpleNamespace(contact=None)
+    result = Prepared(clip, scene)
     choices = Choices(mirror=True, tip=((10.0, 20.0, 2.1),), object=((30.0, 40.0, 2.2),))
     follow(result, choices)
     tracks = laid["tracks"]
-    assert (tracks.side, tracks.cuts, laid["scene"], laid["mirror"]) == (90, (4,), "scene", True)
+    assert (tracks.side, tracks.cuts, laid["scene"], laid["mirror"]) == (90, (4,), scene, True)
     assert tracks.tip[2].tolist() == [10, 20] and tracks.object[4].tolist() == [30, 40]
     assert (tracks.enters, tracks.unmoved) == (0.2, True)
     assert result.warnings == ["cut at [4]"] and result.tracks is tracks
     assert result.notes[0].startswith("6 frames at 20 a second")
     for wrong in ((161.0, 20.0, 2.1), (10.0, 91.0, 2.1), (10.0, 20.0, 1.9), (10.0, 20.0, 2.3)):
         with pytest.raises(prepare.Misplaced, match=r"of 160x90 pixels and 2\.0 to 2\.2 s"):
-            follow(Prepared(clip, "scene"), Choices(tip=(wrong,)))
+            follow(Prepared(clip, scene), Choices(tip=(wrong,)))
+    follow(Prepared(clip, reach), Choices())
+    assert touches == [True, False]
 
 
 def test_the_film_is_kept_as_it_comes_back_from_its_file():

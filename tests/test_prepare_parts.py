@@ -20,7 +20,7 @@ def clip(n=6, height=90, width=160, start=0.0):
 
 
 def prepared(**more):
-    return Prepared(**({"clip": clip(), "scene": None} | more))
+    return Prepared(**({"clip": clip(), "scene": SimpleNamespace(contact=None)} | more))
 
 
 @pytest.mark.parametrize(
@@ -137,12 +137,20 @@ def test_patches_mend_what_the_shipped_detector_finds_and_corners_refine_it(monk
     monkeypatch.setattr(prepare, "Detector", SimpleNamespace(load=detector))
     monkeypatch.setattr(prepare, "mended", mended)
     monkeypatch.setattr(prepare, "refine", lambda seen, found, cuts: (cuts, seen is frames, found))
-    assert prepare.look(frames, [1]) == ([1], True, ([10, 11], [10, 11], [1], True))
-    assert prepare.look(frames)[2][1] == [20, 21]
+    assert prepare.look(frames, [1], True) == ([1], True, ([10, 11], [10, 11], [1], True))
+    assert prepare.look(frames, [], True)[2][1] == [20, 21]
 
 
-@pytest.mark.parametrize(("surer", "thing"), [(2, [20, 20, 20, 21, 21]), (5, [50, 51, 52, 53, 54])])
-def test_the_tip_is_told_by_what_moves_and_the_object_by_the_surer_look(surer, thing):
+WHOLE, MOVING = [50, 51, 52, 53, 54], [20, 20, 20, 21, 21]
+
+
+@pytest.mark.parametrize(
+    ("touched", "tip_by", "object_by", "tip", "thing"),
+    [(True, 5, 2, WHOLE, MOVING), (True, 2, 5, MOVING, WHOLE), (False, 5, 5, MOVING, WHOLE)],
+)
+def test_the_surer_look_counts_and_for_a_hand_that_touches_nothing_the_one_at_what_moves(
+    touched, tip_by, object_by, tip, thing
+):
     """Of five frames two show something new: what stands moves at the fourth. A place is the
     number of a frame among those that are seen, and ten times how many these are."""
     frames = np.zeros((5, 84, 84, 3), np.uint8)
@@ -150,11 +158,12 @@ def test_the_tip_is_told_by_what_moves_and_the_object_by_the_surer_look(surer, t
 
     def detect(seen):
         n = len(seen)
-        return Found(*[np.arange(n) + 10 * n] * 2, np.full(n, 0.1 * n), np.full(n, n == surer))
+        sure = [np.full(n, 0.9 if n == by else 0.1 * n / 5) for by in (tip_by, object_by)]
+        return Found(*[np.arange(n) + 10 * n] * 2, *sure)
 
-    found = prepare.looked(SimpleNamespace(detect=detect), frames)
-    assert found.tip.tolist() == [20, 20, 20, 21, 21] and (found.tip_sure == 0.2).all()
-    assert found.object.tolist() == thing and found.object_sure.all()
+    found = prepare.looked(SimpleNamespace(detect=detect), frames, touched)
+    assert found.tip.tolist() == tip and found.object.tolist() == thing
+    assert found.tip_sure[0] == (0.9 if touched else 0.04) and found.object_sure[0] == 0.9
 
 
 @pytest.mark.parametrize(
@@ -167,7 +176,7 @@ def test_the_tip_is_told_by_what_moves_and_the_object_by_the_surer_look(surer, t
 def test_a_mark_lies_in_the_picture_and_in_the_clips_seconds(mark, inside, monkeypatch):
     """Six frames of 160x90 from 2 s on; the page rounds, so a hundredth of a second is let pass."""
     nothing = Found(np.zeros((6, 2)), np.zeros((6, 2)), np.zeros(6), np.zeros(6))
-    monkeypatch.setattr(prepare, "look", lambda frames, cuts: nothing)
+    monkeypatch.setattr(prepare, "look", lambda frames, cuts, touched: nothing)
     monkeypatch.setattr(
         prepare.footage, "check", lambda frames, cuts: Footage(frames, [], 0.5, False)
     )

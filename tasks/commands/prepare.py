@@ -193,7 +193,7 @@ def follow(result: Prepared, choices: Choices) -> Motion:
     seen = footage.check(frames, clip.cuts)
     frames = seen.frames
     result.clip, result.warnings = replace(clip, frames=frames), result.warnings + seen.warnings
-    found = look(frames, clip.cuts)
+    found = look(frames, clip.cuts, result.scene.contact is not None)
     tracks = Tracks(
         clip.times, found.tip, found.object, found.tip_sure, found.object_sure,
         min(height, width), tuple(clip.cuts), seen.enters, seen.unmoved,
@@ -216,31 +216,33 @@ def follow(result: Prepared, choices: Choices) -> Motion:
     return lay(tracks, result.scene, choices.mirror)
 
 
-def look(frames: np.ndarray, cuts: Sequence[int] = ()) -> Found:
+def look(frames: np.ndarray, cuts: Sequence[int], touched: bool) -> Found:
     """Tip and object in a clip's frames, as the shipped detector sees them and patches agree.
 
     The detector looks at each shot by itself: another shot is another camera's.
     """
     model = Detector.load(EYES)
-    shots = [looked(model, frames[a:b]) for a, b in pairwise([0, *cuts, len(frames)])]
+    shots = [looked(model, frames[a:b], touched) for a, b in pairwise([0, *cuts, len(frames)])]
     found = Found(
         *(np.concatenate([getattr(one, name) for one in shots]) for name in vars(shots[0]))
     )
     return refine(frames, mended(frames, found, cuts), cuts)
 
 
-def looked(model: Detector, frames: np.ndarray) -> Found:
+def looked(model: Detector, frames: np.ndarray, touched: bool) -> Found:
     """Tip and object in one shot, at which the model looks twice: at all of it, and at the frames
     in which something has moved; what rests in between stays where it was.
 
-    An arm that rests for most of a shot is in the shot's median, and so looks like the room: the
-    tip is told by what moves. The object rests as well, before or after: the surer look tells it.
+    What rests for most of a shot is in the shot's median, and so looks like the room. Tip and
+    object are each told by the look that is surer of it. Where nothing is touched a hand rests
+    longest, at its mark, and the look at what moves tells it.
     """
     whole, kept = model.detect(frames), told(frames)
     last = np.searchsorted(kept, np.arange(len(frames)), side="right") - 1
     moving = Found(*(values[last] for values in vars(model.detect(frames[kept])).values()))
-    surer = moving if moving.object_sure.mean() > whole.object_sure.mean() else whole
-    return replace(surer, tip=moving.tip, tip_sure=moving.tip_sure)
+    hand = moving if not touched else max(whole, moving, key=lambda one: one.tip_sure.mean())
+    thing = max(whole, moving, key=lambda one: one.object_sure.mean())
+    return Found(hand.tip, thing.object, hand.tip_sure, thing.object_sure)
 
 
 def stills(result: Prepared) -> np.ndarray:
