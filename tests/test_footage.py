@@ -253,8 +253,9 @@ def test_an_arm_is_a_twenty_fifth_of_the_picture_that_reaches_over_an_edge(box, 
     assert footage._comes_in(moves) == arm
 
 
-def test_the_largest_thing_is_asked_whether_it_comes_in():
-    lamp, toy = (0, 0, 17, 17), (40, 40, 20, 20)
+def test_an_arm_comes_in_beside_something_larger_that_does_not():
+    arm, toy, lamp = (0, 0, 17, 17), (40, 40, 20, 20), (0, 0, 16, 16)
+    assert footage._comes_in(np.stack([moving(arm, toy)] * 2))
     assert not footage._comes_in(np.stack([moving(lamp, toy)] * 2))
     assert not footage._comes_in(np.stack([moving()] * 2))
 

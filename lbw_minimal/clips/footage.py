@@ -111,13 +111,10 @@ def _unmoved(still):
 
 
 def _comes_in(moves):
-    """Whether the largest thing that moves (T, 84, 84) reaches over the picture's edge, as an arm
-    does: a lamp that swings there is smaller than what it swings beside."""
+    """Whether something that moves (T, 84, 84), as large as an arm, reaches over an edge of the
+    picture: what an arm moves may be larger, and need not be at the edge."""
     _, stats = _things(moves.sum(0) >= SOMETIMES)
-    if not len(stats):
-        return False
-    *box, area = max(stats.tolist(), key=lambda thing: thing[4])
-    return bool(area >= COVERS * SMALL**2 and _at_edge(*box))
+    return any(area >= COVERS * SMALL**2 and _at_edge(*box) for *box, area in stats.tolist())
 
 
 def _at_edge(x, y, width, height):
