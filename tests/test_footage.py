@@ -180,7 +180,7 @@ def test_a_lamp_that_swings_at_the_edge_is_no_arm(room):
 def test_arms_from_both_sides_in_a_twentieth_of_the_frames_are_two_people(
     room, share, two, monkeypatch
 ):
-    both = np.array([[0.0, 0.9 if i % 100 < 100 * share else 0.6] for i in range(100)])
+    both = np.array([[0.0, 1.0 if i % 100 < 100 * share else 0.95] for i in range(100)])
     monkeypatch.setattr(footage, "_doors", lambda moves: both)
     doubt = footage.check(arms(room, "left", frames=60)).doubt
     assert ("several people" in doubt[0]) if two else doubt is None

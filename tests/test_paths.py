@@ -162,6 +162,16 @@ def test_enough_frames_have_to_be_sure_and_only_those_count():
 
 
 @pytest.mark.parametrize(
+    ("hand", "reason"), [(5, "the tip of the hand"), (6, "the object is seen")]
+)
+def test_where_neither_hand_nor_object_is_seen_it_is_the_hand_that_hides_both(hand, reason):
+    sure = np.where(np.arange(20) < hand, 1.0, 0.0)
+    hidden = replace(tracks(10.0 * np.arange(20), sure=sure), object_sure=np.zeros(20))
+    with pytest.raises(Unusable, match=reason):
+        trusted(hidden, "object")
+
+
+@pytest.mark.parametrize(
     ("rests", "reason"), [(12, "never moves"), (8, "seen in 0% of the frames")]
 )
 def test_an_object_that_is_suspected_at_one_place_never_moves(rests, reason):

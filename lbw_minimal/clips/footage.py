@@ -26,7 +26,7 @@ COVERS = 0.04  # of the picture: a lamp that swings at its edge covers half of t
 EDGE = 3  # pixels from the picture's edge, over which an arm comes in
 FAINT = 10  # grey levels: at the shoulder an arm moves by little
 SOMETIMES = 2  # frames in which something moves: noise does so in one
-APART = 0.7  # of the width: one arm never comes in at places so far apart
+APART = 1.0  # of the width, from edge to edge: between them a lamp may hang beside an arm
 OFTEN = 0.05  # of the frames: an arm at its median place is not told from the room
 ENDS = 16  # a clip's first and last frames are so many of it
 

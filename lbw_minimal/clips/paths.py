@@ -236,6 +236,8 @@ def trusted(tracks: Tracks, name: str) -> tuple[np.ndarray, np.ndarray]:
     if name == "tip" and not sure.any():
         raise no_tip(tracks)
     if name == "object" and sure.mean() < FOUND:
+        if (tracks.tip_sure >= SURE).mean() < TIP_FOUND:  # what hides the one hides the other
+            raise no_tip(tracks)
         away = np.linalg.norm(tracks.object - np.median(tracks.object, axis=0), axis=1)
         rests = away < STANDS * tracks.side  # (N,) unsure, and still the same place
         if rests.mean() > FOUND and (sure & ~rests).mean() < ELSEWHERE:
