@@ -186,11 +186,12 @@ def found(T, width):
 def test_a_clip_is_searched_with_its_marks_and_its_shorter_side_as_it_was(monkeypatch, golden):
     frames, laid = arm(np.linspace(0, 0.8, 40)), []
     clip = Clip(frames, 1.0 + np.arange(40) / 20, [], [])
-    monkeypatch.setattr(prepare, "look", lambda frames, cuts: found(len(frames), 160))
+    monkeypatch.setattr(prepare, "look", lambda frames, cuts, touched: found(len(frames), 160))
     monkeypatch.setattr(prepare, "lay", lambda *what: laid.append(what))
     monkeypatch.setattr(prepare.footage, "check", lambda frames, cuts: Footage(
         255 - frames, ["It trembles."], 0.3, True))  # fmt: skip
-    result = prepare.Prepared(clip, "scene", warnings=["read"])
+    scene = SimpleNamespace(contact=0.04, name="scene")
+    result = prepare.Prepared(clip, scene, warnings=["read"])
     marks = Choices(tip=((30.0, 40.0, 1.2), (50.0, 60.0, 1.5)), object=((90.0, 60.0, 2.0),))
     prepare.follow(result, marks)
     (tracks, scene, mirror), = laid  # fmt: skip
@@ -199,7 +200,7 @@ def test_a_clip_is_searched_with_its_marks_and_its_shorter_side_as_it_was(monkey
          "else": [*tracks.tip[-1], *tracks.object[0], *tracks.tip_sure[[4, -1]]],
          "rest": [tracks.side, *tracks.cuts, tracks.enters, tracks.unmoved, *tracks.times[[0, -1]]],
          "yours": str(tracks.yours), "notes": result.notes, "warnings": result.warnings,
-         "clip": result.clip.frames.mean(), "asked": [scene, str(mirror)]}
+         "clip": result.clip.frames.mean(), "asked": [scene.name, str(mirror)]}
     )  # fmt: skip
 
 

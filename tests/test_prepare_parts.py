@@ -194,7 +194,7 @@ def test_a_mark_lies_in_the_picture_and_in_the_clips_seconds(mark, inside, monke
 def test_a_user_who_places_the_tip_overrules_that_there_is_no_arm(name, monkeypatch):
     """It is searched all the same, so that the page shows what was found and can be corrected."""
     nothing = Found(np.zeros((6, 2)), np.zeros((6, 2)), np.zeros(6), np.zeros(6))
-    monkeypatch.setattr(prepare, "look", lambda frames, cuts: nothing)
+    monkeypatch.setattr(prepare, "look", lambda frames, cuts, touched: nothing)
     doubt = "no arm is seen", "film one"
     monkeypatch.setattr(
         prepare.footage, "check", lambda frames, cuts: Footage(frames, [], 0.5, False, doubt)
