@@ -330,7 +330,11 @@ def test_patches_are_looked_for_and_chosen_as_they_were(pushed, golden):
                      found.tip_sure, found.object_sure)  # fmt: skip
     both = zip(vars(wrong).values(), vars(mirrored).values(), strict=True)
     shots = np.concatenate([frames, frames[:, :, ::-1]])
-    mend = patches.mended(shots, Found(*map(np.concatenate, both)), (32,))
+    both = Found(*map(np.concatenate, both))
+    mend = [
+        patches.mended(shots[part], Found(*(values[part] for values in vars(both).values())))
+        for part in (slice(32), slice(32, 64))
+    ]
     small, figures = patches.shrunk(frames[::2], 0.8), {}
     tip = patches._tip(found, np.arange(0, 32, 2), 0.8)
     places = [(0, 0.8 * thing[0]), (15, 0.8 * thing[30]), (4, (3.0, 30)), (2, (159.0, 95))]
@@ -342,7 +346,8 @@ def test_patches_are_looked_for_and_chosen_as_they_were(pushed, golden):
     golden(
         figures
         | {
-            "object": mend.object[::4], "sure": mend.object_sure[::4],
+            "object": np.concatenate([one.object for one in mend])[::4],
+            "sure": np.concatenate([one.object_sure for one in mend])[::4],
             "small": [one.mean() for one in small],
             "changed": np.ravel(patches._changed(small)), "tip": tip,
             "peaks": np.concatenate([np.ravel(part) for part in patches._peaks(

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from lbw_minimal.clips.detector import Found
-from lbw_minimal.clips.patches import Path, chosen, mended
+from lbw_minimal.clips.patches import Path, chosen, gone, mended
 from tests.toy_clips import room
 
 H, W, T = 120, 160, 40
@@ -62,14 +62,13 @@ def test_a_hit_thing_whose_first_place_the_hand_hides_is_found_where_it_got_to(c
     assert off(mended(frames, found(hand, hand)), box) < 4
 
 
-def test_each_shot_has_its_own_path(clip):
-    """Before the cut stands the end of the motion, elsewhere in the picture."""
-    frames, hand, box = clip
-    before = np.roll(frames[-10:], 12, axis=1)
-    told = Found(*(np.concatenate([p[-10:] + (0, 12), p]) for p in (hand, box)),
-                 np.ones(T + 10), np.ones(T + 10))  # fmt: skip
-    mend = mended(np.concatenate([before, frames]), told, cuts=(10,))
-    assert off(replace(mend, object=mend.object[10:]), box) < 4
+def test_how_far_an_object_goes_counts_only_where_it_is_mostly_seen(clip):
+    """60 pixels across and 80 down, with a glitch that is no way."""
+    path = np.array([[10.0, 10], [10, 10], [300, 10], [10, 10], [70, 90], [70, 90]])
+    sure = np.array([1.0, 1, 1, 1, 1, 1])
+    assert gone(Found(path, path, sure, sure)) == 100
+    assert gone(Found(path, path, sure, np.array([0.5, 0.5, 0, 0, 0.5, 0.4]))) == 100
+    assert gone(Found(path, path, sure, np.array([0.5, 0, 0, 0, 0.5, 0.4]))) == 0
 
 
 def test_where_nothing_moves_but_the_hand_the_object_stays_where_it_is(clip):

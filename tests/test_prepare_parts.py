@@ -1,5 +1,6 @@
 """What `prepare` says and in what order it looks, with clips that were never filmed."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -131,14 +132,17 @@ def test_patches_mend_what_the_shipped_detector_finds_and_corners_refine_it(monk
         assert path.name == "eyes.safetensors"
         return SimpleNamespace(detect=lambda seen: Found(*[seen[:, 0, 0, 0] + 10 * len(seen)] * 4))
 
-    def mended(seen, found, cuts):
-        return found.tip.tolist(), found.object_sure.tolist(), cuts, seen is frames
+    def mended(seen, found):  # each time by 100 and the shot's frames
+        return replace(found, object=found.object + 100 + len(seen))
 
     monkeypatch.setattr(prepare, "Detector", SimpleNamespace(load=detector))
     monkeypatch.setattr(prepare, "mended", mended)
+    monkeypatch.setattr(prepare, "gone", lambda found: 0.0)
     monkeypatch.setattr(prepare, "refine", lambda seen, found, cuts: (cuts, seen is frames, found))
-    assert prepare.look(frames, [1], True) == ([1], True, ([10, 11], [10, 11], [1], True))
-    assert prepare.look(frames, [], True)[2][1] == [20, 21]
+    cuts, same, found = prepare.look(frames, [1], True)
+    assert cuts == [1] and same
+    assert found.tip.tolist() == [10, 11] and found.object.tolist() == [111, 112]
+    assert prepare.look(frames, [], True)[2].object.tolist() == [122, 123]
 
 
 WHOLE, MOVING = [50, 51, 52, 53, 54], [20, 20, 20, 21, 21]
@@ -149,7 +153,7 @@ WHOLE, MOVING = [50, 51, 52, 53, 54], [20, 20, 20, 21, 21]
     [(True, 5, 2, WHOLE, MOVING), (True, 2, 5, MOVING, WHOLE), (False, 5, 5, MOVING, WHOLE)],
 )
 def test_the_surer_look_counts_and_for_a_hand_that_touches_nothing_the_one_at_what_moves(
-    touched, tip_by, object_by, tip, thing
+    touched, tip_by, object_by, tip, thing, monkeypatch
 ):
     """Of five frames two show something new: what stands moves at the fourth. A place is the
     number of a frame among those that are seen, and ten times how many these are."""
@@ -161,9 +165,39 @@ def test_the_surer_look_counts_and_for_a_hand_that_touches_nothing_the_one_at_wh
         sure = [np.full(n, 0.9 if n == by else 0.1 * n / 5) for by in (tip_by, object_by)]
         return Found(*[np.arange(n) + 10 * n] * 2, *sure)
 
+    monkeypatch.setattr(prepare, "mended", lambda frames, found: found)
+    monkeypatch.setattr(prepare, "gone", lambda found: 0.0)
     found = prepare.looked(SimpleNamespace(detect=detect), frames, touched)
     assert found.tip.tolist() == tip and found.object.tolist() == thing
     assert found.tip_sure[0] == (0.9 if touched else 0.04) and found.object_sure[0] == 0.9
+
+
+@pytest.mark.parametrize(
+    ("ways", "touched", "object_"),
+    [((5, 3, 4), True, 0), ((5, 5, 9), True, 2), ((5, 9, 5), True, 1), ((5, 9, 9), False, 0)],
+    ids=["the-surer", "at-what-moves", "at-all", "nothing-is-touched"],
+)
+def test_of_what_patches_make_of_the_looks_the_object_goes_farthest(
+    ways, touched, object_, monkeypatch
+):
+    """The tip stays the surer look's. Patches are asked of it, of the whole look, of the other."""
+    asked = []
+
+    def mended(seen, found):
+        asked.append(len(asked))
+        return replace(found, tip=found.tip - 1, object=np.full(len(seen), asked[-1]))
+
+    def detect(seen):
+        n = len(seen)
+        return Found(*[np.full(n, 10 * n)] * 2, np.full(n, 0.9 - 0.1 * n), np.full(n, 0.5))
+
+    monkeypatch.setattr(prepare, "mended", mended)
+    monkeypatch.setattr(prepare, "gone", lambda found: ways[found.object[0]])
+    frames = np.zeros((5, 84, 84, 3), np.uint8)
+    frames[:3, 40:50, 20:30] = frames[3:, 40:50, 50:60] = 200
+    found = prepare.looked(SimpleNamespace(detect=detect), frames, touched)
+    assert found.object.tolist() == [object_] * 5
+    assert found.tip.tolist() == [20] * 5  # the look at the two frames is surer
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,6 @@ first, and moves later.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -18,7 +17,7 @@ import cv2
 import numpy as np
 
 from lbw_minimal.clips.detector import SURE, Found
-from lbw_minimal.clips.paths import median3
+from lbw_minimal.clips.paths import FOUND, median3
 
 SMALL = 160  # pixels, the longer side of the frames in which patches are looked for
 LOOK_AT = 48  # frames of a shot that are looked at, spread over it
@@ -103,34 +102,39 @@ class Path:
         return float((self.alike > ALIKE).mean() + 0.5 * self.alike.mean() + min(self.alone, 0.3))
 
 
-def mended(frames: np.ndarray, found: Found, cuts: Sequence[int] = ()) -> Found:
-    """Found, in each shot with the path of the best patch where the object's does not move as one.
+def mended(frames: np.ndarray, found: Found) -> Found:
+    """Found in a shot, with the path of the best patch where the object's does not move as one.
 
-    cuts: frames with which a new shot begins. Where no patch moves as an object does either, the
-    detector is believed, unless most of what it saw rests: then nothing moves.
+    Where no patch moves as an object does either, the detector is believed, unless most of what it
+    saw rests: then nothing moves.
     """
-    places, sure = found.object.copy(), found.object_sure.copy()
-    for first, last in pairwise([0, *cuts, len(frames)]):
-        part = Found(*(getattr(found, name)[first:last] for name in vars(found)))
-        k = np.unique(np.linspace(0, last - first - 1, LOOK_AT).round().astype(int))
-        scale = min(1.0, SMALL / max(frames.shape[1:3]))
-        tip = _tip(part, k, scale)
-        side = round(min(frames.shape[1:3]) * scale)
-        own = Path(part.object[k] * scale, part.object_sure[k], tip, side)
-        if own.seen and own.pushed:
-            continue
-        small = shrunk(frames[first:last][k], scale)
-        changed = _changed(small)
-        best = chosen(paths(small, _seen(part, k, scale) + [(0, at) for at in changed], tip))
-        if best is None:  # a small thing may be hidden where it was, and in sight where it got to
-            best = chosen(paths(small, [(len(k) - 1, at) for at in changed], tip))
-        if best is not None and not best.agrees(own, 0.9):  # a patch is known to a pixel only
-            along = np.arange(last - first)
-            for axis in (0, 1):
-                places[first:last, axis] = np.interp(along, k, best.places[:, axis] / scale)
-            # A patch that is just alike is just sure.
-            sure[first:last] = np.interp(along, k, np.clip(1 + (best.alike - 1) / 0.8, 0, 1))
-    return replace(found, object=places, object_sure=sure)
+    k = np.unique(np.linspace(0, len(frames) - 1, LOOK_AT).round().astype(int))
+    scale = min(1.0, SMALL / max(frames.shape[1:3]))
+    tip = _tip(found, k, scale)
+    side = round(min(frames.shape[1:3]) * scale)
+    own = Path(found.object[k] * scale, found.object_sure[k], tip, side)
+    if own.seen and own.pushed:
+        return found
+    small = shrunk(frames[k], scale)
+    changed = _changed(small)
+    best = chosen(paths(small, _seen(found, k, scale) + [(0, at) for at in changed], tip))
+    if best is None:  # a small thing may be hidden where it was, and in sight where it got to
+        best = chosen(paths(small, [(len(k) - 1, at) for at in changed], tip))
+    if best is None or best.agrees(own, 0.9):  # a patch is known to a pixel only
+        return found
+    along = np.arange(len(frames))
+    places = [np.interp(along, k, best.places[:, axis] / scale) for axis in (0, 1)]
+    # A patch that is just alike is just sure.
+    sure = np.interp(along, k, np.clip(1 + (best.alike - 1) / 0.8, 0, 1))
+    return replace(found, object=np.stack(places, 1), object_sure=sure)
+
+
+def gone(found: Found) -> float:
+    """How far the object goes, in pixels; 0 where it is sure in less than half of the frames."""
+    seen = median3(found.object[found.object_sure >= SURE])
+    if len(seen) < FOUND * len(found.object):
+        return 0.0
+    return float(np.linalg.norm(np.ptp(seen, axis=0)))
 
 
 def chosen(some: list[Path]) -> Path | None:
