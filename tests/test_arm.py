@@ -54,6 +54,15 @@ def env(request):
     env.close()
 
 
+def test_nothing_but_hand_and_fingers_touches_what_is_in_the_way(env):
+    """A ball of a metre lies over the whole arm, its foot among it."""
+    p, arm = env.world.p, env.arm
+    ball = p.createMultiBody(1.0, p.createCollisionShape(p.GEOM_SPHERE, radius=1.0))
+    p.performCollisionDetection()
+    touched = {contact[3] for contact in p.getContactPoints(arm.body, ball)}
+    assert touched == {arm.links[name] for name in arm.spec.reach_links}
+
+
 def test_at_rest_the_tip_points_straight_down(env):
     """The pitches of shoulder, elbow and wrist add up to it, to a hundredth of a radian."""
     env.arm._set(env.arm.home)

@@ -71,14 +71,15 @@ def test_the_truth_of_the_kits_videos_is_where_the_camera_sees_the_recorded_stat
 ):
     recording = load_recordings(tasks.VIDEOS / task / "experts.npz")[0]
     frames = np.zeros((len(recording.states), 84, 84, 3), np.uint8)
-    read = []
+    read, refined = [], []
     monkeypatch.setattr(eyes.video, "read", lambda path: (read.append(path.name) or frames, []))
-    monkeypatch.setattr(eyes.detector, "refine", lambda frames, found: found)
+    monkeypatch.setattr(eyes.detector, "refine", lambda *what: refined.append(what) or what[1])
     (clip,) = eyes.filmed(Model(), task, most=1)
     env = tasks.bare(task, embodiment="human", observation="state")
     tip, thing = (env.world.pixel(recording.states[5, k : k + 3]) for k in (0, 3))
     env.close()
     assert read == ["expert_01.mp4"] and clip.unit == 1
+    assert refined[0][0] is frames and refined[0][1] is clip.found
     np.testing.assert_allclose(clip.tip[5], tip)
     if task == "reach":  # it has no object
         assert np.isnan(clip.object).all()
