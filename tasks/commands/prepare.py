@@ -163,9 +163,8 @@ def usable(name: str, path: Path) -> Prepared:
     clip = prepare(name, path)
     if clip.why_not:
         look = shlex.join(["python", "-m", "tasks", "prepare", name, str(path)])
-        raise InputError(
-            f"{path}: {clip.why_not} What was seen in it, and how to correct that, shows: {look}"
-        )
+        more = f" {look} shows what was seen in it, and how to correct that."
+        raise InputError(f"{path}: {clip.why_not}{more if clip.tracks is not None else ''}")
     for warning in clip.warnings:
         print(f"warning: {path}: {warning}", file=sys.stderr)
     return clip
