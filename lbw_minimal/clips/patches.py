@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 
 from lbw_minimal.clips.detector import SURE, Found
-from lbw_minimal.clips.paths import FOUND, median3
+from lbw_minimal.clips.paths import FOUND, extent, median3
 
 SMALL = 160  # pixels, the longer side of the frames in which patches are looked for
 LOOK_AT = 48  # frames of a shot that are looked at, spread over it
@@ -60,7 +60,7 @@ class Path:
     @property
     def way(self) -> float:
         """How far it goes, in shorter sides of the frame."""
-        return float(np.linalg.norm(np.ptp(median3(self.places), axis=0)) / self.side)
+        return extent(self.places) / self.side
 
     @property
     def start(self) -> int:
@@ -131,10 +131,8 @@ def mended(frames: np.ndarray, found: Found) -> Found:
 
 def gone(found: Found) -> float:
     """How far the object goes, in pixels; 0 where it is sure in less than half of the frames."""
-    seen = median3(found.object[found.object_sure >= SURE])
-    if len(seen) < FOUND * len(found.object):
-        return 0.0
-    return float(np.linalg.norm(np.ptp(seen, axis=0)))
+    sure = found.object_sure >= SURE
+    return extent(found.object[sure]) if sure.mean() >= FOUND else 0.0
 
 
 def chosen(some: list[Path]) -> Path | None:

@@ -157,8 +157,7 @@ def longest_piece(tracks: Tracks, touched: bool, warnings: list[str]) -> Tracks:
         if len(seen) and seen[-1] + 1 - seen[0] >= LEAST_FRAMES:
             pieces.append(tracks.part(seen[0], seen[-1] + 1))
     if not pieces:
-        if (tracks.tip_sure >= SURE).mean() < TIP_FOUND:
-            raise no_tip(tracks)
+        check_tip(tracks)
         raise Unusable(
             f"{len(tracks.times)} frames are too few, even without cuts {LEAST_FRAMES} are needed",
             "film the whole motion in one go, at 10 frames a second or more",
@@ -217,27 +216,26 @@ def _jumps(tracks, c):
 
 
 def _extent(tracks, name):
-    points = getattr(tracks, name)[getattr(tracks, f"{name}_sure") >= SURE]
-    return np.linalg.norm(np.ptp(median3(points), axis=0)) if len(points) else 0.0
+    return extent(getattr(tracks, name)[getattr(tracks, f"{name}_sure") >= SURE])
 
 
-def no_tip(tracks: Tracks) -> Unusable:
-    """The error for a tip that is too rarely seen."""
+def check_tip(tracks: Tracks, least: float = TIP_FOUND) -> None:
+    """Raise Unusable for a tip that is surely found in less than that share of the frames."""
     share = (tracks.tip_sure >= SURE).mean()
-    return Unusable(
-        f"the tip of the hand is seen in {share:.0%} of the clip, and hidden or out of it else",
-        SIDE_ON,
-    )
+    if share < least:
+        raise Unusable(
+            f"the tip of the hand is seen in {share:.0%} of the clip, and hidden or out of it else",
+            SIDE_ON,
+        )
 
 
 def trusted(tracks: Tracks, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Times and points (n, 2) of the frames in which the tip or the object is surely found."""
     sure = getattr(tracks, f"{name}_sure") >= SURE
-    if name == "tip" and not sure.any():
-        raise no_tip(tracks)
+    if name == "tip":
+        check_tip(tracks, least=1 / len(sure))  # one frame
     if name == "object" and sure.mean() < FOUND:
-        if (tracks.tip_sure >= SURE).mean() < TIP_FOUND:  # what hides the one hides the other
-            raise no_tip(tracks)
+        check_tip(tracks)  # what hides the one hides the other
         away = np.linalg.norm(tracks.object - np.median(tracks.object, axis=0), axis=1)
         rests = away < STANDS * tracks.side  # (N,) unsure, and still the same place
         if rests.mean() > FOUND and (sure & ~rests).mean() < ELSEWHERE:
@@ -260,6 +258,11 @@ def median3(points: np.ndarray) -> np.ndarray:
         return points
     middle = np.median([points[:-2], points[1:-1], points[2:]], axis=0)
     return np.concatenate([points[:1], middle, points[-1:]])
+
+
+def extent(points: np.ndarray) -> float:
+    """The diagonal, in pixels, of what points (n, 2) cover without single glitches; 0 for none."""
+    return float(np.linalg.norm(np.ptp(median3(points), axis=0))) if len(points) else 0.0
 
 
 def interpolate(s: np.ndarray, points: np.ndarray, t: np.ndarray) -> np.ndarray:

@@ -20,16 +20,14 @@ from lbw_minimal.clips.paths import (
     REST,
     RESTS,
     STANDS,
-    SURE,
-    TIP_FOUND,
     Tracks,
     Unusable,
+    check_tip,
     ends,
     interpolate,
     longest_piece,
     low_pass,
     never_moves,
-    no_tip,
     of_a_hand,
     progress,
     trusted,
@@ -102,8 +100,8 @@ def lay(tracks: Tracks, scene: Scene, mirror: bool | None = None) -> Motion:
     tip = thing = low_pass(*trusted(tracks, "tip"), t)  # (N, 2) pixels
     if touched:
         thing = low_pass(*trusted(tracks, "object"), t)
-    elif (tracks.tip_sure >= SURE).mean() < TIP_FOUND:
-        raise no_tip(tracks)
+    else:
+        check_tip(tracks)
     what, least = ("object", STANDS) if touched else ("hand", LITTLE)
     start, end = ends(thing, least * tracks.side, what)
     gone = float(np.linalg.norm(end - start))

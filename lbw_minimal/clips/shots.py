@@ -145,11 +145,11 @@ def clip_frames(
     used: the first and the last second that the motion shows; frames outside are grey.
     """
     figures = []
+    slack = 0.5 * float(np.median(np.diff(times))) if used else 0.0
     for i in spread(len(times), FRAMES):
         t, image = times[i], drawn(frames[i], tracks, i)
         file = cv2.imencode(".webp", image[..., ::-1])[1].tobytes()
         size = f'data-width="{frames.shape[2]}" data-height="{frames.shape[1]}"'
-        slack = 0.5 * float(np.median(np.diff(times))) if used else 0.0
         inside = not used or used[0] - slack <= t <= used[1] + slack
         found = [f"{name} {_how_sure(tracks, name, i)}" for name in ("tip", "object") if tracks]
         caption = "; ".join([f"{t:.2f} s", *([", ".join(found)] if found else [])])

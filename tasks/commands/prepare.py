@@ -199,9 +199,9 @@ def follow(result: Prepared, choices: Choices) -> Motion:
     )  # fmt: skip
     tracks = tracks.marked("tip", list(choices.tip)).marked("object", list(choices.object))
     result.tracks = tracks
-    if seen.doubt and not choices.tip:
-        raise Unusable(*seen.doubt)
     if seen.doubt:
+        if not choices.tip:
+            raise Unusable(*seen.doubt)
         reason, _ = seen.doubt
         result.warnings.append(
             f"{reason[0].upper()}{reason[1:]}: it was searched all the same, because you placed "
@@ -244,7 +244,9 @@ def looked(model: Detector, frames: np.ndarray, touched: bool) -> Found:
     hand = moving if not touched else max(whole, moving, key=lambda one: one.tip_sure.mean())
     thing = max(whole, moving, key=lambda one: one.object_sure.mean())
     surer = Found(hand.tip, thing.object, hand.tip_sure, thing.object_sure)
-    looks = (surer, whole, moving) if touched else (surer,)
+    looks = [surer]
+    if touched:  # the one that is surer of both is asked already
+        looks += [one for one in (whole, moving) if not (one is hand and one is thing)]
     thing = max((mended(frames, one) for one in looks), key=gone)
     return Found(hand.tip, thing.object, hand.tip_sure, thing.object_sure)
 
