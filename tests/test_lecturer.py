@@ -237,6 +237,14 @@ def test_a_piece_weighs_what_few_have_and_nothing_that_all_have():
     assert pair.total == pytest.approx(len(set(trees.pieces(two)) - kit) * math.log2(8 / 2))
 
 
+def test_what_a_submission_answered_is_taken_apart_once(monkeypatch):
+    asked, names = [], [ODD.replace("best", name) for name in ("one", "two")]
+    monkeypatch.setattr(alike, "pieces", lambda text: asked.append(text) or trees.pieces(text))
+    alike.read({"exercises": [{"id": "6.1", "source": names[0]}, {"id": "6.2", "source": ""}]})
+    assert alike.compare(["a", "b"], {"6.1": dict(enumerate(names))}).trees["6.1"].keys() == {0, 1}
+    assert [text for text in asked if text] == names
+
+
 def test_the_references_answer_and_the_cell_that_was_handed_out_are_nobodys():
     class_ = a_class(RIGHT, RIGHT.replace("distances", "d"))
     assert not [p for p in class_.pairs if p.b == 21 or p.a >= 20]
