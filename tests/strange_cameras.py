@@ -3,6 +3,8 @@
 import cv2
 import numpy as np
 
+MARGIN = 1.5  # times the picture: what a camera that is carried about may see
+
 
 def ease(t):
     """Minimum jerk, 0 to 1."""

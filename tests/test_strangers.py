@@ -8,9 +8,12 @@ import functools
 import numpy as np
 import pytest
 
+import tasks
 from lbw_minimal.clips.detector import Found
 from tasks.commands.prepare import prepare
 from tests.strange_eyes import looked_at
+from tests.strange_scenes import film
+from tests.strange_stories import Moment, Tool, people, staged, story, way
 from tests.strangers import FAULTS, Stranger, judged, stranger, trial
 
 DEVELOPED = 2  # the seed with which prepare was mended
@@ -37,6 +40,12 @@ def test_the_verdict_is_right(i, kind, tmp_path):
 def test_a_clip_is_the_same_whenever_it_is_made():
     first, again = developed(6), stranger(DEVELOPED, 6)
     assert np.array_equal(first.frames, again.frames) and first.task == again.task == "push"
+
+
+def test_any_kind_is_filmed_or_painted_as_asked():
+    as_it_comes, filmed = developed(5), stranger(DEVELOPED, 5, "filmed")
+    assert as_it_comes.made == "painted" and filmed.made == "filmed"
+    assert as_it_comes.kind == filmed.kind == "still"
 
 
 def test_a_verdict_is_right_if_its_reason_is():
@@ -75,3 +84,113 @@ def test_the_truth_is_in_the_pixels_of_the_clip_as_it_is_read(task, tmp_path):
         np.isnan(seen.object).all() if task == "reach" else np.allclose(seen.object[1:], (200, 100))
     )
     assert one.tip[0, 0] == 481  # the clip's own truth is left as it was
+
+
+# Filmed kinds are what they say.
+
+
+def told(kind, task="push", seed=0):
+    """A story's moments, where its arms' tips got to (n, arms, 3) m, and how many pixels of the
+    thing and of each arm the kit's camera sees then, (n, 1 + arms)."""
+    rng = np.random.default_rng(seed)
+    env = tasks.bare(task, embodiment="human", observation="state")
+    env.reset(seed=0)
+    start, goal, p = env.object_position(), env.target_position(), env.world.p
+    pushed = way(start, start, goal, seconds=(0.8, 1))
+    behind = way(env.START, start, np.minimum(goal, env.WORKSPACE[1]), seconds=(0.8, 1))
+    done = [Moment(*both) for both in zip(behind, pushed, strict=True)]
+    moments = story(rng, env, kind, done)
+    arms, tips, pixels = people(rng, env, kind, moments), [], []
+    thing = {"push": "cube", "slide": "puck", "coffee": "mug"}.get(task)
+    bodies = [getattr(env, thing) if thing else -1, *(arm.body for arm in arms)]
+    for _ in staged(env, moments, arms, None):
+        tips.append([arm.tip_pose()[0] for arm in arms])
+        seen = p.getCameraImage(84, 84, env.world.view, env.world.projection,
+                                renderer=p.ER_TINY_RENDERER)[4]  # fmt: skip
+        pixels.append([(np.asarray(seen) == body).sum() for body in bodies])
+    env.close()
+    return moments, np.array(tips), np.array(pixels)
+
+
+def paths(moments):
+    """The ways (n, 3) m of tip and thing."""
+    return np.array([m.tip for m in moments]), np.array([m.thing for m in moments])
+
+
+@pytest.mark.parametrize(
+    ("kind", "task"),
+    [(kind, task)
+     for kind in ("never moves", "pulled", "lifted", "hidden", "two people")
+     for task in ("push", "slide", "coffee", "drawer")
+     if task != "drawer" or kind not in ("lifted", "hidden")],
+)  # fmt: skip
+def test_the_arm_is_where_the_story_has_it(kind, task):
+    moments, tips, _ = told(kind, task)
+    assert np.abs(tips[:, 0] - paths(moments)[0]).max() < 1e-3
+    if kind == "two people":
+        assert np.abs(tips[:, 1] - [m.other for m in moments]).max() < 1e-3
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_where_the_thing_never_moves_the_hand_does_and_does_not_get_into_it(seed):
+    moments, _, _ = told("never moves", seed=seed)
+    tip, thing = paths(moments)
+    assert np.ptp(thing, axis=0).max() == 0 and np.ptp(tip, axis=0).max() > 0.05
+    assert ((np.abs(tip - thing)[:, [0, 2]] - 0.025).max(1) > 0.01).all()  # half a cube
+
+
+def test_a_still_has_one_moment_and_a_thing_without_an_arm_goes_by_itself():
+    still, _, _ = told("still")
+    assert all(np.array_equal(m.thing, still[0].thing) for m in still)
+    moments, _, pixels = told("no arm")
+    assert paths(moments)[1][-1, 0] - paths(moments)[1][0, 0] == pytest.approx(0.15, abs=0.01)
+    assert (pixels[:, 0] > 0).all() and (pixels[:, 1] == 0).all()
+
+
+@pytest.mark.parametrize("task", ["push", "slide", "coffee"])
+@pytest.mark.parametrize("seed", range(2))
+def test_a_pulled_thing_comes_towards_the_arm_with_the_tip_on_top_or_beyond(task, seed):
+    tip, thing = paths(told("pulled", task, seed)[0])
+    assert thing[-1, 0] < thing[0, 0] - 0.1
+    moves = np.abs(np.diff(thing[:, 0])) > 1e-4
+    assert (tip[1:] >= thing[1:])[moves][:, 0].all()
+
+
+@pytest.mark.parametrize("task", ["push", "slide", "coffee"])
+def test_a_lifted_thing_leaves_the_table_by_more_than_a_third_of_its_way(task):
+    _, thing = paths(told("lifted", task)[0])
+    assert np.ptp(thing[:, 2]) > 0.33 * np.ptp(thing[:, 0]) > 0.04
+
+
+@pytest.mark.parametrize("task", ["push", "slide", "coffee"])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_hidden_thing_is_seen_before_and_hardly_while_it_moves(task, seed):
+    moments, _, pixels = told("hidden", task, seed)
+    moves = np.abs(np.diff(paths(moments)[1][:, 0])) > 1e-4
+    assert (pixels[1:, 0][moves] < 0.35 * pixels[0, 0]).all() and moves.sum() > 10
+
+
+@pytest.mark.parametrize("task", ["reach", "push", "coffee", "drawer"])
+def test_two_people_are_both_seen(task):
+    _, _, pixels = told("two people", task)
+    assert (pixels[:, 1:] > 100).mean(0).min() > 0.5
+
+
+@pytest.mark.parametrize("task", ["reach", "push", "drawer"])
+def test_a_steep_way_goes_more_up_or_down_than_across(task):
+    pictures, tip, thing = film(np.random.default_rng(0), task, 72, 96, 6, "steep")
+    across, up = np.ptp(tip if task == "reach" else thing, axis=0)
+    assert len(pictures) == len(tip) and up > 1.3 * across
+
+
+def test_a_tool_ends_at_the_tip_and_begins_in_the_hand():
+    env = tasks.bare("push", embodiment="human", observation="state")
+    env.reset(seed=0)
+    tool, tip = Tool(np.random.default_rng(1), env.world), np.array([0.6, 0, 0.05])
+    tool.put(tip)
+    place, turned = env.world.p.getBasePositionAndOrientation(tool.parts[0][0])
+    axis = np.array(env.world.p.getMatrixFromQuaternion(turned)).reshape(3, 3)[:, 2]
+    half = np.linalg.norm(tool.middle)
+    assert np.allclose(place - half * axis, tip) and axis[2] > 0.8
+    assert np.allclose(np.cross(axis, tool.up), 0) and np.linalg.norm(tool.up) < 2 * half
+    env.close()
