@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lbw_minimal.clips.paths import Tracks, Unusable
-from lbw_minimal.clips.pushing import check_hand, check_way, gets_faster
+from lbw_minimal.clips.pushing import check_hand, check_steps, check_way, gets_faster
 
 TOUCH, THERE, N = 20, 40, 50
 WAY = np.clip((np.arange(N) - TOUCH) / (THERE - TOUCH), 0, 1)
@@ -147,3 +147,18 @@ def test_a_speed_is_taken_over_four_steps():
     path = np.stack([x, 0 * x], 1)
     assert not gets_faster(path) and gets_faster(path[:14])
     assert not gets_faster(path[:4])
+
+
+@pytest.mark.parametrize(
+    ("leap", "back", "two"), [(0.59, 1.0, False), (0.61, 1.0, True), (0.59, 0.1, False)]
+)
+def test_what_leaps_three_fifths_of_its_way_may_be_two_things(leap, back, two):
+    """From 0.2 of the way by a leap, then in small steps to the end; what it does then is free."""
+    gone = np.concatenate([[0, 0.1, 0.2], np.linspace(0.2 + leap, 1, 5), [back]])
+    start, end = np.array([200.0, 100.0]), np.array([100.0, 120.0])
+    seen = start + gone[:, None] * (end - start)
+    if two:
+        with pytest.raises(Unusable, match="the object leaps 61% of its way"):
+            check_steps(seen, start, end)
+    else:
+        check_steps(seen, start, end)

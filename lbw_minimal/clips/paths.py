@@ -130,11 +130,13 @@ def _fades_out(t, sure, mark, way):
 def of_a_hand(tracks: Tracks, notes: list[str]) -> Tracks:
     """The tracks of a clip in which nothing is touched: what moves there is the hand.
 
-    So what was taken for an object stands in for a tip that was not found, or hardly moves.
+    So what was taken for an object stands in for a tip that was not found, or hardly moves. It does
+    not if it rests itself: a thing that lies at the mark is no hand.
     """
     tip, thing = ((sure >= SURE).mean() for sure in (tracks.tip_sure, tracks.object_sure))
-    moves = _extent(tracks, "object") > 2 * _extent(tracks, "tip")
-    if thing < FOUND or (tip >= TIP_FOUND and not moves):
+    gone = _extent(tracks, "object")
+    moves = gone > 2 * _extent(tracks, "tip")
+    if thing < FOUND or gone < STANDS * tracks.side or (tip >= TIP_FOUND and not moves):
         return tracks
     notes.append("The tip was not found; what moves instead was taken for the hand.")
     return replace(tracks, tip=tracks.object, tip_sure=tracks.object_sure)

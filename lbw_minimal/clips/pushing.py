@@ -18,6 +18,9 @@ HIDES = 0.18
 SIDEWAYS = 0.25  # of the width: an arm that comes in farther inside comes from above
 GLUED = 0.25  # of its way: a hand that comes to an object comes nearer by more
 COMES_DOWN = 0.25  # of its way: a table and a camera are not so far out of level
+# Of its way, between two frames in turn in which it is surely seen: a thing that is pushed goes by
+# at most 0.48, and a dot that jumps from one hand to the other by 0.7 to 1.
+LEAP = 0.6
 STRIDE = 4  # steps, over which a speed is taken
 FASTEST = 0.95  # of the highest speed: the rest is noise
 
@@ -91,6 +94,23 @@ def check_hand(tracks: Tracks, t: np.ndarray, thing: np.ndarray, along: np.ndarr
         raise Unusable(
             "the arm is between the object and the camera, and hides it",
             "push it from behind, with the hand between it and the edge of the picture",
+        )
+
+
+def check_steps(seen: np.ndarray, start: np.ndarray, end: np.ndarray) -> None:
+    """Raise Unusable where the object leaps: what is seen before and after is not one thing.
+
+    seen (n, 2): its pixels in the frames in which it is surely seen; start, end (2,): of its way.
+    """
+    along = end - start
+    gone = (seen - start) @ along / (along @ along)  # (n,) of its way
+    there = int(gone.argmax())
+    leap = float(np.abs(np.diff(gone[: there + 1])).max(initial=0))
+    if leap > LEAP:
+        raise Unusable(
+            f"the object leaps {min(1, leap):.0%} of its way between two pictures in which it is "
+            "surely seen, and may be two things",
+            "film one arm from the side, and the object in sight on all its way",
         )
 
 

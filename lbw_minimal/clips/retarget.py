@@ -33,7 +33,7 @@ from lbw_minimal.clips.paths import (
     trusted,
     unsure,
 )
-from lbw_minimal.clips.pushing import check_hand, check_way, gets_faster
+from lbw_minimal.clips.pushing import check_hand, check_steps, check_way, gets_faster
 
 FPS = 25  # steps a second of the motion, as in the tasks
 CONTACT = 0.12  # of the object's way: by then it is pushed, whatever the tip's pixels say
@@ -99,7 +99,8 @@ def lay(tracks: Tracks, scene: Scene, mirror: bool | None = None) -> Motion:
     t = np.arange(tracks.times[0], tracks.times[-1] + 1e-9, 1 / FPS)
     tip = thing = low_pass(*trusted(tracks, "tip"), t)  # (N, 2) pixels
     if touched:
-        thing = low_pass(*trusted(tracks, "object"), t)
+        s, seen = trusted(tracks, "object")
+        thing = low_pass(s, seen, t)
     else:
         check_tip(tracks)
     what, least = ("object", STANDS) if touched else ("hand", LITTLE)
@@ -124,6 +125,8 @@ def lay(tracks: Tracks, scene: Scene, mirror: bool | None = None) -> Motion:
     if touched:
         check_way(tip, thing, way, (i, j), (start, end), tracks.enters)
         check_hand(tracks, t[i : j + 1], thing[i : j + 1], end - start)
+        if not scene.hit:  # a hit thing may go far while it is a blur
+            check_steps(seen, start, end)
         x, object_ = _push(x, way, scene, warnings)
     else:
         object_ = None
