@@ -286,7 +286,7 @@ def test_arms_come_in_where_they_did(golden):
         near[10 + off, off : off + 20, 20:40] = True
     doors, figures = footage._doors(np.concatenate([moves, near])), {}
     for t in range(0, 24, 4):
-        labels, stats = footage._things(moves[t])
+        labels, stats = footage.things(moves[t])
         figures[f"things {t}"] = [labels.max(), *stats.ravel()]
     few = [footage._comes_in(moves[a:b]) for a in range(0, 24, 3) for b in (a + 1, a + 2, a + 5)]
     at = [

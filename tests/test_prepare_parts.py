@@ -165,14 +165,14 @@ def test_the_surer_look_counts_and_for_a_hand_that_touches_nothing_the_one_at_wh
 
     def detect(seen):
         n = len(seen)
-        sure = [np.full(n, 0.9 if n == by else 0.1 * n / 5) for by in (tip_by, object_by)]
+        sure = [np.full(n, 0.9 if n == by else 0.5 + 0.1 * n / 5) for by in (tip_by, object_by)]
         return Found(*[np.arange(n) + 10 * n] * 2, *sure)
 
     monkeypatch.setattr(prepare, "mended", lambda frames, found: found)
     monkeypatch.setattr(prepare, "gone", lambda found: 0.0)
     found = prepare.looked(SimpleNamespace(detect=detect), frames, touched)
     assert found.tip.tolist() == tip and found.object.tolist() == thing
-    assert found.tip_sure[0] == (0.9 if touched else 0.04) and found.object_sure[0] == 0.9
+    assert found.tip_sure[0] == (0.9 if touched else 0.54) and found.object_sure[0] == 0.9
 
 
 @pytest.mark.parametrize(
@@ -201,6 +201,28 @@ def test_of_what_patches_make_of_the_looks_the_object_goes_farthest(
     found = prepare.looked(SimpleNamespace(detect=detect), frames, touched)
     assert found.object.tolist() == [object_] * 5
     assert found.tip.tolist() == [20] * 5  # the look at the two frames is surer
+
+
+@pytest.mark.parametrize(
+    ("touched", "sure", "outline"), [(False, 2, True), (False, 3, False), (True, 2, False)]
+)
+def test_a_reaching_hand_that_is_rarely_sure_is_told_by_its_outline(
+    touched, sure, outline, monkeypatch
+):
+    """Surely seen in two of ten frames, of which three are enough."""
+
+    def detect(seen):
+        n = len(seen)
+        return Found(*[np.zeros((n, 2))] * 2, np.where(np.arange(n) < sure, 0.9, 0.1), np.zeros(n))
+
+    monkeypatch.setattr(prepare, "told", lambda frames: np.arange(len(frames)))
+    monkeypatch.setattr(prepare, "mended", lambda frames, found: found)
+    frames = np.zeros((10, 84, 84, 3), np.uint8)
+    end = np.full((10, 2), 7.0), np.arange(10) > 3
+    monkeypatch.setattr(prepare, "far_end", lambda seen: end if seen is frames else None)
+    found = prepare.looked(SimpleNamespace(detect=detect), frames, touched)
+    assert found.tip[0, 0] == (7 if outline else 0)
+    assert (found.tip_sure >= 0.5).sum() == (6 if outline else sure)
 
 
 @pytest.mark.parametrize(

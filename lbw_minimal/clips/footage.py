@@ -104,7 +104,7 @@ def _unmoved(still):
     frames (T, 84, 84)."""
     few = max(1, len(still) // ENDS)
     first, last = np.median(still[:few], axis=0), np.median(still[-few:], axis=0)
-    _, stats = _things(np.abs(first - last) > MOVED)
+    _, stats = things(np.abs(first - last) > MOVED)
     return not any(
         area >= MOVED_SHARE * SMALL**2 and not _at_edge(*box) for *box, area in stats.tolist()
     )
@@ -113,7 +113,7 @@ def _unmoved(still):
 def _comes_in(moves):
     """Whether something that moves (T, 84, 84), as large as an arm, reaches over an edge of the
     picture: what an arm moves may be larger, and need not be at the edge."""
-    _, stats = _things(moves.sum(0) >= SOMETIMES)
+    _, stats = things(moves.sum(0) >= SOMETIMES)
     return any(area >= COVERS * SMALL**2 and _at_edge(*box) for *box, area in stats.tolist())
 
 
@@ -126,7 +126,7 @@ def _doors(moves):
     left, right and upper edge, 0 to 1 from left to right; nan where none does."""
     out = np.full((len(moves), 2), np.nan)
     for t, moved in enumerate(moves):
-        labels, stats = _things(moved)
+        labels, stats = things(moved)
         large = 1 + np.flatnonzero(stats[:, 4] >= LARGE * SMALL**2)
         inside = np.isin(labels, large)
         x = np.flatnonzero(inside[:EDGE].any(0)).tolist()
@@ -136,9 +136,9 @@ def _doors(moves):
     return out
 
 
-def _things(mask):
-    """Labels (84, 84) of what hangs together in a mask but for gaps of less than 9 pixels, and its
-    x, y, width, height and area, (n, 5)."""
+def things(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Labels (84, 84), from 1 on, of what hangs together in a mask but for gaps of less than 9
+    pixels, and its x, y, width, height and area, (n, 5)."""
     closed = cv2.morphologyEx(mask.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((9, 9), np.uint8))
     _, labels, stats, _ = cv2.connectedComponentsWithStats(closed)
     return labels, stats[1:]

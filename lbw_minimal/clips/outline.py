@@ -1,0 +1,55 @@
+"""Where the tip of a reaching hand is, told by its outline alone. Not from the paper.
+
+The detector knows arms as they were drawn, and of some real hands it is never sure. But where a
+hand touches nothing, what differs from the picture before it came is the arm, and who it belongs
+to. It comes in over an edge, and its tip is what is farthest from that edge.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from lbw_minimal.clips.footage import EDGE, ENDS, LARGE, things
+from lbw_minimal.clips.motion import MOVED, SMALL, high_pass, small
+
+FIRST = 60  # pixels of an edge, over which an arm has come in by when it is told which edge that is
+FAR = 0.98  # quantile: what is farther is the tip, and not a pixel of noise beyond it
+
+
+def far_end(frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The tip (T, 2), in pixels, of what has come into the frames (T, H, W, 3) uint8 of a camera
+    that stands, and where (T,) bool that is seen: not where nothing has come in yet, or where it
+    reaches across all the picture."""
+    passed = high_pass(np.stack([small(frame) for frame in frames]))
+    before = np.median(passed[: max(1, len(passed) // ENDS)], axis=0)
+    inside = [_arm(np.abs(one - before) > MOVED) for one in passed]
+    side = _side(inside)
+    tip, seen = np.zeros((len(frames), 2)), np.zeros(len(frames), bool)
+    scale = np.array(frames.shape[2:0:-1]) / SMALL
+    for t, arm in enumerate(inside):
+        if arm.any():
+            y, x = np.nonzero(arm)
+            depth = (x, SMALL - 1 - x, y)[side]
+            far = depth >= np.quantile(depth, FAR)
+            tip[t] = scale * (np.median([x[far], y[far]], axis=1) + 0.5)
+            seen[t] = depth.max() < SMALL - EDGE
+    return tip, seen
+
+
+def _arm(moved):
+    """The pixels that moved (84, 84) of the largest thing that comes in over an edge, or none."""
+    labels, stats = things(moved)
+    comes = (stats[:, :2].min(1) <= EDGE) | (stats[:, 0] + stats[:, 2] >= SMALL - EDGE)
+    area = np.where(comes, stats[:, 4], 0)
+    if area.max(initial=0) < LARGE * SMALL**2:
+        return np.zeros_like(moved)
+    return moved & (labels == 1 + area.argmax())
+
+
+def _side(inside):
+    """Over which edge an arm, its pixels (84, 84) in each frame, has come in first: 0 the left, 1
+    the right, 2 the upper one."""
+    over = np.array([(a[:, :EDGE].sum(), a[:, -EDGE:].sum(), a[:EDGE].sum()) for a in inside])
+    counted = np.cumsum(over, axis=0)
+    enough = int((counted.sum(1) >= FIRST).argmax()) or len(over) - 1
+    return int(counted[enough].argmax())
