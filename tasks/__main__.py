@@ -10,6 +10,7 @@ import sys
 from importlib import import_module
 
 import tasks
+from lbw_minimal.cluster import INTERRUPTED
 from lbw_minimal.training import InputError
 from tasks.commands import COMMANDS
 
@@ -35,7 +36,8 @@ def overview() -> str:
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run a command line; returns its exit code: 2 for a mistake, named in a sentence on stderr."""
+    """Run a command line; returns its exit code: 2 for a mistake, named in a sentence on stderr,
+    130 if it was interrupted."""
     name, *rest = (sys.argv[1:] if argv is None else argv) or ["--help"]
     try:
         if name in ("-h", "--help"):
@@ -50,6 +52,10 @@ def main(argv: list[str] | None = None) -> int:
     except InputError as error:
         print(f"error: {error}", file=sys.stderr)
         return 2
+    except KeyboardInterrupt:
+        way = "; the same line with --resume goes on" if name in tasks.TASKS else ""
+        print(f"\ninterrupted{way}", file=sys.stderr)
+        return INTERRUPTED
     return 0
 
 

@@ -207,6 +207,26 @@ def test_resuming_with_other_settings_is_refused(tmp_path, capfd):
     assert "other settings" in capfd.readouterr().err
 
 
+@pytest.mark.parametrize(("command", "way"), [("push", "; the same line with --resume goes on"),
+                                              ("prepare", "")])  # fmt: skip
+def test_an_interrupt_is_a_line_that_names_the_way_on(command, way, monkeypatch, capfd):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    module = "run" if command == "push" else command
+    monkeypatch.setattr(f"tasks.commands.{module}.main", interrupted)
+    assert main([command]) == 130
+    assert capfd.readouterr().err == f"\ninterrupted{way}\n"
+
+
+def test_a_film_that_was_prepared_for_another_task_is_refused(tmp_path, capfd):
+    film = tmp_path / "reenactment.mp4"
+    film.write_bytes(b"of a push")
+    film.with_name("prepare.json").write_text('{"task": "push"}')
+    assert main(["drawer", "--video", str(film), "--out", str(tmp_path / "run")]) == 2
+    assert "prepared for push; prepare the clip for drawer" in capfd.readouterr().err
+
+
 def test_a_folder_of_the_users_own_files_is_never_emptied(tmp_path, capfd):
     (tmp_path / "thesis.txt").write_text("three years of work")
     main(["push", "--fast", "--device", "abacus", "--out", str(tmp_path)])

@@ -266,7 +266,8 @@ def test_a_page_shows_the_film_its_translation_and_the_keypoints_of_that(tmp_pat
     prepare.write(tmp_path, "push", nothing, note)
     assert (asked["columns"], asked["shown"], asked["states"]) == ((), None, None)
     assert (asked["motion"], asked["learn"]) == ("laid", "")
-    assert asked["verdict"] == "not usable: why." and not list(tmp_path.iterdir())
+    assert asked["verdict"] == "not usable: why."
+    assert [file.name for file in tmp_path.iterdir()] == ["prepare.json"]  # whose the page is
 
 
 def test_a_piece_of_a_clip_is_read_and_keeps_the_clips_own_seconds(monkeypatch, tmp_path):
@@ -314,4 +315,4 @@ def test_nothing_of_an_earlier_clip_stays_beside_one_that_is_not_usable(tmp_path
     for file in (clip, *(tmp_path / name for name in names)):
         file.touch()
     assert prepare.main(["push", str(clip), "--out", str(tmp_path)]) == 2
-    assert {file.name for file in tmp_path.iterdir()} == {"a.mp4", "other.txt"}
+    assert {file.name for file in tmp_path.iterdir()} == {"a.mp4", "prepare.json", "other.txt"}

@@ -38,6 +38,18 @@ def test_who_replaces_an_earlier_run_of_other_settings_is_told(tmp_path, capsys)
     assert capsys.readouterr().err == said
 
 
+def test_a_smoke_run_replaces_no_whole_run_that_has_learnt(tmp_path):
+    prepare_folder(tmp_path, {"fast": False}, resume=False)
+    prepare_folder(tmp_path, {"fast": True}, resume=False)  # a replay is soon done again
+    for fast in (True, False):  # over a smoke run both may go
+        (tmp_path / "policy_log.json").write_text("[]")
+        prepare_folder(tmp_path, {"fast": fast}, resume=False)
+    (tmp_path / "policy_log.json").write_text("[]")
+    with pytest.raises(InputError, match="a smoke run would replace the whole run"):
+        prepare_folder(tmp_path, {"fast": True}, resume=False)
+    assert (tmp_path / "policy_log.json").exists()
+
+
 def test_what_looks_like_results_in_a_folder_without_a_run_is_somebody_elses(tmp_path):
     (tmp_path / "metrics.json").write_text("a thesis")
     prepare_folder(tmp_path, {"seed": 0}, resume=False)

@@ -8,7 +8,7 @@ import numpy as np
 
 from lbw_minimal.clips.stills import read_stills, write_stills
 from tasks.commands import own_clip
-from tasks.commands.links import folder
+from tasks.commands.links import folder, mark
 from tasks.commands.own_clip import bring
 
 
@@ -16,6 +16,25 @@ def test_a_run_on_a_clip_keeps_clear_of_other_runs():
     assert folder("push", None) == Path("runs/push")
     assert folder("push", Path("clips/my clip.v2.mp4")) == Path("runs/push-my clip.v2")
     assert folder("push", Path("my.mp4"), Path("there")) == Path("there/push-my")
+
+
+def test_of_two_clips_of_one_name_each_keeps_its_folder(tmp_path):
+    mine, yours = tmp_path / "mine" / "my.mp4", tmp_path / "yours" / "my.mp4"
+    for clip, data in ((mine, b"a push"), (yours, b"another")):
+        clip.parent.mkdir()
+        clip.write_bytes(data)
+    runs = tmp_path / "runs"
+    for clip, name in ((mine, "push-my"), (yours, "push-my-2"), (mine, "push-my")):
+        here = folder("push", clip, runs)
+        assert here == runs / name
+        here.mkdir(parents=True, exist_ok=True)
+        (here / "prepare.json").write_text(json.dumps({"mark": mark(clip)}))
+    mine.write_bytes(b"a plea")  # as long, and filmed again
+    assert folder("push", mine, runs) == runs / "push-my-3"
+    film = runs / "push-my-2" / "reenactment.mp4"  # made of yours, and so has its run
+    assert mark(film) == mark(yours)
+    film.with_name("prepare.json").write_text("{")  # nobody's, as far as is known
+    assert folder("push", mine, runs) == runs / "push-my-2"
 
 
 def test_stills_come_back_in_their_order_and_an_older_clips_are_removed(tmp_path):
@@ -72,8 +91,10 @@ def test_any_other_clip_gets_a_page_of_its_own(tmp_path, monkeypatch):
     film = prepared(tmp_path / "made")
     alone = tmp_path / "reenactment.mp4"
     for clip, file in ((own, film.with_name("my clip.mp4")), (own, alone), (again, film)):
+        file.write_bytes(b"a film")
         said = bring(tmp_path, "push", clip, file)
-        assert said == {"clip": file.name, "corrections": "", "command": ""}
+        known = {"clip": file.name, "mark": mark(file), "task": "push", "corrections": ""}
+        assert said == known | {"command": ""}
         note = wrote[-1][-1]
         assert wrote.pop()[:3] == (tmp_path, "push", clip)
         quoted = f"'{file}'" if " " in str(file) else f"{file}"

@@ -13,6 +13,7 @@ from lbw_minimal.clips.reader import Clip
 from lbw_minimal.training import InputError
 from tasks.commands import prepare
 from tasks.commands.choices import Choices, parser
+from tasks.commands.links import mark
 from tasks.commands.prepare import Prepared, follow
 
 
@@ -54,7 +55,8 @@ def test_a_usable_clip_is_told_with_its_warnings_and_how_to_learn_from_it(
     )
     learn = f"python -m tasks push --video {out / 'reenactment.mp4'} --out 'runs/push-my clip'"
     said = "--from 1 --no-mirror --tip 3,4@1.5"
-    note = {"clip": "my clip.mp4", "corrections": said, "command": command}
+    known = {"clip": "my clip.mp4", "mark": mark(file), "task": "push"}
+    note = known | {"corrections": said, "command": command}
     assert asked == [("push", file, choices), ("push", result, note, learn)]
     assert capsys.readouterr().out.splitlines() == [
         "usable, with 2 warnings", f"page: {out / 'page'}", "warning: It is dark.",

@@ -22,9 +22,9 @@ from lbw_minimal.imitate import Perception, Recipe, Run, load_perception
 from lbw_minimal.reward import MENDS
 from lbw_minimal.training import InputError, pick_device, write_atomic
 from tasks.commands import JITTER, Parser, at_least, make_folder, metres
-from tasks.commands.links import folder
+from tasks.commands.links import FILM, NOTE, folder
 from tasks.commands.own_clip import bring
-from tasks.commands.prepare import FILM, NOTE, PAGE, STILLS, usable
+from tasks.commands.prepare import PAGE, STILLS, usable
 from tasks.commands.recipe import METHODS, PIXELS, fields_of, recipe_of
 from tasks.commands.record import EXPERTS
 
@@ -147,7 +147,8 @@ def check(name: str, args: argparse.Namespace, argv: list[str]) -> Job:
         "recipe": fields_of(recipe, args.method),
     }
     run = Run(prepare_folder(out, settings, args.resume))
-    command = shlex.join(["python", "-m", "tasks", name, *argv])
+    again = [word for word in argv if word != "--resume"]  # which would only test it again
+    command = shlex.join(["python", "-m", "tasks", name, *again])
     run.metrics["command"] = command
     run.metrics["settings"] = settings
     run.metrics["version"] = __version__
@@ -248,6 +249,11 @@ def prepare_folder(out: Path, settings: dict[str, Any], resume: bool) -> Path:
             raise InputError(f"{out}: that run had other settings; give those, or another --out.")
         return out
     make_folder(out)
+    fast = note.exists() and json.loads(note.read_text(encoding="utf-8")).get("fast")
+    if settings.get("fast") and not fast and (out / "policy_log.json").exists():
+        raise InputError(
+            f"{out}: a smoke run would replace the whole run that is there; give another --out."
+        )
     try:
         if note.exists() and note.read_text(encoding="utf-8") != json.dumps(settings):
             print(f"note: {out}: an earlier run with other settings is replaced.", file=sys.stderr)

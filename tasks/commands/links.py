@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
 import os
 from html import escape
+from itertools import chain, count
 from pathlib import Path
 
 import tasks
 
 RUNS = Path("runs")  # where the commands write if they are not told otherwise
+FILM = "reenactment.mp4"  # what `prepare` makes of a clip
+NOTE = "prepare.json"  # the clip's name, its mark, its task, its corrections and the command
+MARKED = 1 << 20  # bytes: two clips of one size that begin alike are one
 PAGES = {  # in RUNS, what each is called, and the command that makes it
     "gallery/index.html": ("all tasks", "python -m tasks gallery"),
     "book/index.html": ("the course", "python -m solutions book"),
@@ -22,8 +28,38 @@ BESIDE = {
 
 
 def folder(name: str, clip: Path | None, runs: Path = RUNS) -> Path:
-    """Where a run of the task `name` writes by default: each clip has a folder of its own."""
-    return runs / (f"{name}-{clip.stem}" if clip else name)
+    """Where a run of the task `name` writes by default: each clip has a folder of its own.
+
+    Of two clips of one name the second has the next folder, with a -2 behind it.
+    """
+    if not clip:
+        return runs / name
+    first = runs / f"{name}-{clip.stem}"
+    numbered = (first.with_name(f"{first.name}-{i}") for i in count(2))
+    return next(path for path in chain([first], numbered) if _may_have(clip, path))
+
+
+def _may_have(clip: Path, path: Path) -> bool:
+    """Whether no other clip's note lies in a folder."""
+    there = noted(path)
+    return "mark" not in there or there["mark"] == mark(clip)
+
+
+def mark(clip: Path) -> str:
+    """What tells a clip from another of its name; a film that was made of one has that one's."""
+    if clip.name == FILM and "mark" in (note := noted(clip.parent)):
+        return note["mark"]
+    with open(clip, "rb") as file:
+        digest = hashlib.sha256(file.read(MARKED)).hexdigest()
+    return f"{clip.stat().st_size}-{digest[:16]}"
+
+
+def noted(path: Path) -> dict[str, str]:
+    """The note in a folder; nothing where there is none."""
+    try:
+        return json.loads((path / NOTE).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
 
 
 def links(page: Path, runs: Path = RUNS) -> str:

@@ -13,8 +13,8 @@ import shutil
 from pathlib import Path
 
 from lbw_minimal.training import write_atomic
-from tasks.commands.links import links
-from tasks.commands.prepare import FILM, NOTE, PAGE, STILLS, Prepared, write
+from tasks.commands.links import FILM, NOTE, links
+from tasks.commands.prepare import PAGE, STILLS, Prepared, note_of, write
 
 NAV = re.compile(r"<nav.*?</nav>\n", re.DOTALL)
 
@@ -36,6 +36,6 @@ def bring(out: Path, name: str, clip: Prepared, file: Path) -> dict[str, str]:
         write_atomic(out / PAGE, NAV.sub(lambda _: here, text, count=1))
         return json.loads(note.read_text(encoding="utf-8"))
     command = shlex.join(["python", "-m", "tasks", "prepare", name, str(file)])
-    said = {"clip": file.name, "corrections": "", "command": command}
+    said = note_of(file, name, command)
     write(out, name, clip, said)
     return said | {"command": ""}  # the run's own does it as well

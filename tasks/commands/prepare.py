@@ -35,11 +35,10 @@ from lbw_minimal.report import COLUMNS
 from lbw_minimal.training import InputError, write_atomic
 from tasks.commands import make_folder
 from tasks.commands.choices import Choices, parser
-from tasks.commands.links import RUNS, folder, links
+from tasks.commands.links import FILM, NOTE, RUNS, folder, links, mark, noted
 from tasks.world.reenact import Reenactment, reenact
 
-FILM, PAGE = "reenactment.mp4", "prepare.html"
-NOTE = "prepare.json"  # the clip's name, its corrections and the command, for the report of a run
+PAGE = "prepare.html"
 STILLS = "stills.webp"  # of a clip that was re-enacted, for the report of a run
 SHOWN = 60  # frames of the page's film, which are translated as well: 4 s of work on one core
 OWN = 12  # grey levels: the kit's own films begin with the scene's picture to within 6 of 256
@@ -102,13 +101,13 @@ def main(argv: list[str]) -> int:
         return 2
     make_folder(out)
     if result.why_not and args.file.resolve() != (out / FILM).resolve():
-        for before in (FILM, STILLS, NOTE):  # which nobody is to learn from by mistake
+        for before in (FILM, STILLS):  # which nobody is to learn from by mistake
             (out / before).unlink(missing_ok=True)
     # The film's name is every clip's; a run bears the clip's.
     named = ["--video", str(out / FILM), "--out", str(folder(args.task, args.file))]
     learn = shlex.join(["python", "-m", "tasks", args.task, *named])
     command = shlex.join(["python", "-m", "tasks", "prepare", *argv])
-    note = {"clip": args.file.name, "corrections": str(choices), "command": command}
+    note = note_of(args.file, args.task, command) | {"corrections": str(choices)}
     page = write(out, args.task, result, note, "" if result.why_not else learn)
     print(f"{result.verdict}\npage: {page}")
     for warning in result.warnings:
@@ -156,11 +155,21 @@ def prepare(name: str, path: Path, choices: Choices | None = None) -> Prepared:
     return result
 
 
+def note_of(file: Path, task: str, command: str) -> dict[str, str]:
+    """What stays known of a clip: its name and mark, the task, its "corrections", none as yet, and
+    the "command" that prepares it."""
+    return {"clip": file.name, "mark": mark(file), "task": task, "corrections": "",
+            "command": command}  # fmt: skip
+
+
 def usable(name: str, path: Path) -> Prepared:
     """The user's clip, re-enacted for the task; what is odd about it is said.
 
-    Raises InputError if it is not usable.
+    Raises InputError if it is not usable, or was prepared for another task.
     """
+    made_for = noted(path.parent).get("task", name) if path.name == FILM else name
+    if made_for != name:
+        raise InputError(f"{path}: it was prepared for {made_for}; prepare the clip for {name}.")
     clip = prepare(name, path)
     if clip.why_not:
         look = shlex.join(["python", "-m", "tasks", "prepare", name, str(path)])
@@ -295,14 +304,13 @@ def keep(result: Prepared, frames: np.ndarray) -> None:
 def write(out: Path, name: str, result: Prepared, note: dict[str, str], learn: str = "") -> Path:
     """Write the page, and the film of a usable clip, into the folder `out`. Returns the page.
 
-    note: the name of the "clip", its "corrections", and the "command" that made all this; learn:
-    the command that comes next, if there is one.
+    note: see `note_of`; learn: the command that comes next, if there is one.
     """
     shown, columns = None, tuple[np.ndarray, ...]()
+    write_atomic(out / NOTE, json.dumps(note))
     if len(result.film):
         write_atomic(out / FILM, result.file)
         write_stills(out / STILLS, stills(result))
-        write_atomic(out / NOTE, json.dumps(note))
         perception = imitate.load_perception(tasks.WEIGHTS / name, name)
         shown = spread(len(result.film), SHOWN)
         translated = perception.translate(result.film[shown])
