@@ -2,7 +2,8 @@
 
 Each test file runs once under coverage.py, which writes down the lines that each test has run. A
 constant runs when its file is imported, in no test: it is met by the tests of the lines that name
-it, in whatever file they are, and a function's head by those of its body.
+it, in whatever file they are, and by those that list constants; a function's head by those of its
+body.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ USES_KIT = re.compile(r"^ *(from|import) (lbw_minimal|tasks)\b", re.M)
 NOT_ASKED = {"test_house.py", "test_builds.py", "test_cluster.py", "test_systems.py"}
 BANDS = (0.2, 1.0, 5.0)  # s: brief tests first
 MOST_FILES = 12
+LISTS = "tests/test_golden_settings.py"  # of constants
 BUDGET = 10.0  # s of processor time that the tests of one fault may take, by what they took before
 
 
@@ -96,11 +98,11 @@ class Lines:
         tests come the others of their files, which may share what it made. What goes beyond the
         budget is left out; every: nothing is.
         """
-        running = self.running(file, line)
+        running, at_import = self.running(file, line)
         own = f"tests/test_{Path(file).stem}.py"
         count, whole = (Counter(map(file_of, tests)) for tests in (running, self.seconds))
         most = sorted(count, key=lambda name: (name != own, -count[name] / whole[name]))
-        most = most if every else most[:MOST_FILES]
+        most = (most if every else most[:MOST_FILES]) + [LISTS] * at_import
         some = {t for t in self.seconds if file_of(t) in most}
 
         def rank(test: str) -> tuple:
@@ -114,8 +116,9 @@ class Lines:
                 chosen.append(test)
         return chosen
 
-    def running(self, file: str, line: int) -> set[str]:
-        """The tests that run the statement of a line, or what names it."""
+    def running(self, file: str, line: int) -> tuple[set[str], bool]:
+        """The tests that run the statement of a line, or what names it; whether it runs when the
+        file is imported."""
         first, last, names, at_import = statement(ast.parse("\n".join(self.code[file])), line)
         tests = self.of_lines((file, n) for n in range(first, last + 1))
         if at_import or not tests:
@@ -127,8 +130,8 @@ class Lines:
                 if names and word.search(code)
             )
         if at_import and not tests:
-            return self.of_lines(place for place in self.by_line if place[0] == file)
-        return tests
+            tests = self.of_lines(place for place in self.by_line if place[0] == file)
+        return tests, at_import
 
     def of_lines(self, places: Iterable[tuple[str, int]]) -> set[str]:
         return set().union(*(self.by_line.get(place, ()) for place in places))

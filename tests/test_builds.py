@@ -106,3 +106,14 @@ def test_a_frame_is_the_same_from_tuples_and_their_reading_is_cheap(monkeypatch)
     assert times["ours"] < 0.5 * times["one by one"]
     monkeypatch.setattr(world.p, "getCameraImage", tuples, raising=False)
     assert np.array_equal(world.render(), want)
+
+
+def test_what_moves_is_seen_where_it_is_nearer_than_the_scenery(monkeypatch):
+    world = tasks.bare("push").world
+    behind = np.full((168, 168), 0.5, np.float32)
+    monkeypatch.setattr(world, "depth", behind)
+    for depth, seen in ((0.49, True), (0.5, False), (0.51, False)):
+        red = np.tile(np.uint8([250, 0, 0, 255]), (168, 168, 1))
+        image = 168, 168, red, np.full((168, 168), depth, np.float32), None
+        monkeypatch.setattr(world.p, "getCameraImage", lambda *a, i=image, **k: i, raising=False)
+        assert (world.render() == [250, 0, 0]).all() == seen

@@ -65,13 +65,23 @@ def lines(monkeypatch):
 
 def test_a_constant_is_met_by_the_tests_of_what_names_it_whoever_imported_it(lines):
     """Line 8 names NEAR. The file was first imported in test_c."""
-    running = lines.running("kit/far.py", 3)
+    running, at_import = lines.running("kit/far.py", 3)
     assert running >= {"tests/test_a.py::runs", "tests/test_b.py::long", "tests/test_far.py::own"}
+    assert at_import
+
+
+def test_a_constant_is_met_by_the_list_of_constants_too_and_what_a_test_runs_is_not(
+    lines, monkeypatch
+):
+    monkeypatch.setattr(by_line, "LISTS", "tests/test_c.py")
+    assert "tests/test_c.py::other" in lines.tests("kit/far.py", 3)
+    assert "tests/test_c.py::other" not in lines.tests("kit/far.py", 8)
 
 
 def test_the_tests_of_a_statement_are_those_of_all_of_its_lines(lines):
-    assert lines.running("kit/far.py", 12) == {"tests/test_b.py::runs", "tests/test_far.py::own"}
-    assert lines.running("kit/far.py", 13) == lines.running("kit/far.py", 12)
+    running, at_import = lines.running("kit/far.py", 12)
+    assert running == {"tests/test_b.py::runs", "tests/test_far.py::own"} and not at_import
+    assert lines.running("kit/far.py", 13) == (running, at_import)
 
 
 def test_brief_tests_come_first_and_the_others_of_their_files_last(lines):

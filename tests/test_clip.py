@@ -271,6 +271,20 @@ def test_a_piece_can_be_asked_for(tmp_path):
     assert len(clip.frames) == 26 and shows(clip.frames, reach(100)[25:51]) < 8
 
 
+def test_what_comes_after_a_piece_is_not_read(tmp_path, monkeypatch):
+    decoded = []
+
+    class Counted(clips.Decoder):
+        def __iter__(self):
+            for frame in super().__iter__():
+                decoded.append(frame)
+                yield frame
+
+    monkeypatch.setattr(clips, "Decoder", Counted)
+    read_clip(encode(tmp_path / "a.mp4", reach(100)), start=0, end=1.0)
+    assert len(decoded) == 27  # one that is beyond the end tells that it is
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="needs Linux, whose /proc tells the peak")
 def test_4k_needs_little_memory(tmp_path):
     """30 frames are 375 MB, if what was decoded is kept."""

@@ -26,8 +26,9 @@ def test_three_corners_tell_an_objects_way_and_two_do_not(fewer, known, monkeypa
     offsets = np.array([(-3.0, 0), (3, 0), (0, 4)])[: 3 - fewer]
     monkeypatch.setattr(corners, "follow", lambda grey: way[-len(grey) :, None] + offsets)
     found = way + np.random.default_rng(0).uniform(-2, 2, way.shape)
+    given = found.copy()
     path, there = corners.followed(np.zeros((20, 84, 84, 3), np.uint8), found)
-    assert there.all() == there.any() == known
+    assert there.all() == there.any() == known and (found == given).all()
     off = np.abs(path - way - (path - way).mean(0)).max()
     assert off < 1e-9 if known else off > 0.5
 

@@ -382,6 +382,8 @@ def test_the_second_look_takes_in_what_was_found_and_stays_within_the_picture():
     assert (left, top) == (0, 0)  # the middle is (40, 40)
     left, top, side = detector._closer(place + 120, sure, (200, 300))
     assert (left, top) == (160 - side // 2, 200 - side)
+    place[99:] += 1000  # what is seen far away in one frame of fifty says nothing
+    assert detector._closer(place, sure, (200, 300))[2] == pytest.approx(side, abs=3)
     few = sure * (np.arange(101) < 2)[:, None]
     assert detector._closer(place, few, (200, 300)) == (0, 0, 300)
 

@@ -15,11 +15,19 @@ from lbw_minimal.imitate import Recipe
 from lbw_minimal.training import InputError
 from tasks.commands import eyes, prepare, probe, recipe, run
 
-CLIPS = (
-    *("detector", "detector_networks", "drawings", "drawn_shapes", "patches", "corners", "reader"),
-    *("decoding", "hdr", "upright", "footage", "stills", "lookalike"),
-)
-COMMANDS = ("eyes", "prepare", "run", "recipe", "probe")
+MODULES = {
+    "lbw_minimal.clips": (
+        *("detector", "detector_networks", "drawings", "drawn_shapes", "patches", "corners"),
+        *("reader", "decoding", "hdr", "upright", "footage", "stills", "lookalike", "camera"),
+        *("motion", "outline", "paths", "pushing", "retarget", "shots"),
+    ),
+    "tasks": tuple(tasks.TASKS),
+    "tasks.world": ("arm", "bodies", "env", "motion", "reenact", "scene"),
+    "tasks.commands": (
+        *("eyes", "prepare", "run", "recipe", "probe", "ablation", "batch", "controls", "paper"),
+        *("robustness", "table", "translations", "stage"),
+    ),
+}
 
 
 def flat(value):
@@ -59,11 +67,11 @@ def settings(module):
     return {name: json.dumps(value) for name, value in out.items() if value is not None}
 
 
-@pytest.mark.parametrize("package", ["lbw_minimal.clips", "tasks.commands"])
+@pytest.mark.parametrize("package", MODULES)
 def test_settings_are_those_of_the_shipped_results(package, golden):
     """A number that means something has a name, so this is a list of nearly all of them."""
     figures = {}
-    for name in COMMANDS if package == "tasks.commands" else CLIPS:
+    for name in MODULES[package]:
         found = settings(importlib.import_module(f"{package}.{name}"))
         figures |= {f"{name}.{key}": value for key, value in found.items()}
     golden(figures)

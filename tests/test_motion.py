@@ -110,6 +110,14 @@ def test_fewer_than_three_frames_have_no_jump():
     assert jumps(film([10.0, 60.0]), np.array([0, 3.0])) == []
 
 
+def test_a_flat_picture_is_looked_at_at_a_height_of_eight_pixels(monkeypatch):
+    sizes = []
+    rest = np.zeros(2)
+    monkeypatch.setattr(motion, "_unexplained", lambda f, size: sizes.append(size) or (rest, rest))
+    jumps(np.zeros((3, 4, 400, 3), np.uint8), np.arange(3.0) / 25)
+    assert sizes == [(motion.WIDTH, 8)]
+
+
 @pytest.mark.parametrize(
     ("rate", "times", "jumped"),
     [(25, 3.2, False), (25, 3.4, True), (10, 4.3, False), (10, 4.5, True)],

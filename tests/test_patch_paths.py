@@ -228,7 +228,7 @@ def test_patches_are_looked_for_in_48_frames_of_160_pixels_and_come_back_in_the_
     """A clip of 95 frames of 320 x 240: every second one, at half of the size. A patch that is
     just alike is just sure, and one that is wholly alike wholly."""
     way = np.stack([np.linspace(20, 67, 48), np.full(48, 50.0)], 1)
-    alike = np.repeat([1.0, 0.6, 0.2], 16)
+    alike = np.repeat([1.0, 0.6, 0.2, -0.5], [16, 16, 15, 1])
     best = Path(way, alike, None, 120)
     nowhere = Found(*np.zeros((2, 95, 2)), *np.zeros((2, 95)))
     frames = np.zeros((95, 240, 320, 3), np.uint8)
@@ -236,7 +236,7 @@ def test_patches_are_looked_for_in_48_frames_of_160_pixels_and_come_back_in_the_
     assert len(small) == 48 and small[0].shape == (120, 160, 3)
     np.testing.assert_allclose(mend.object[:, 0], 40 + np.arange(95))
     np.testing.assert_allclose(mend.object[:, 1], 100)
-    np.testing.assert_allclose(mend.object_sure[[0, 40, 94]], [1, 0.5, 0], atol=1e-9)
+    np.testing.assert_allclose(mend.object_sure[[0, 40, 92, 94]], [1, 0.5, 0, 0], atol=1e-9)
     assert not mend.tip_sure.any() and not mend.tip.any()
 
 

@@ -233,6 +233,13 @@ def test_start_and_end_of_a_way_are_medians_of_its_rests():
     np.testing.assert_allclose(ends(path, 4.0, "object")[0], [10, 40], atol=0.5)
 
 
+def test_a_rest_ends_where_a_tenth_of_the_way_is_gone():
+    """By 1 in four frames, to 100; what is nearer than 5 to the farthest place is the end."""
+    x = np.r_[np.arange(0.0, 5), np.arange(9.0, 13), 40, 94, 96, 98, 100]
+    start, end = ends(np.stack([x, 0 * x], 1), 4.0, "object")
+    assert (start[0], end[0]) == (3, 98)  # of 0, 1, 2, 3, 4, 9 and 10; of 96, 98 and 100
+
+
 def test_what_goes_less_than_asked_never_moves():
     path = np.stack([np.linspace(0, 3, 9), np.zeros(9)], 1)
     ends(path, 2.9, "hand")

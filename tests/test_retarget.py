@@ -244,7 +244,14 @@ def test_a_hand_that_stirs_by_less_than_a_tenth_of_the_picture_does_not_reach(sh
 
 @pytest.mark.parametrize(
     ("tip", "thing", "way", "stands_in"),
-    [(0.25, 0.6, 9, 1), (0.35, 0.6, 9, 1), (0.35, 0.6, 7, 0), (0.25, 0.4, 9, 0), (0.25, 0.6, 7, 0)],
+    [
+        (0.25, 0.6, 9, 1),
+        (0.25, 0.5, 9, 1),
+        (0.35, 0.6, 9, 1),
+        (0.35, 0.6, 7, 0),
+        (0.25, 0.4, 9, 0),
+        (0.25, 0.6, 7, 0),
+    ],
 )
 def test_in_a_reach_what_moves_is_the_hand_if_no_tip_is_found(tip, thing, way, stands_in):
     """A tip that rests, in three frames of ten, is enough; what stands in for it has to be seen in

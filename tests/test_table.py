@@ -119,6 +119,7 @@ def test_ablation_has_a_row_a_mend_and_a_picture(runs):
     assert len(text.splitlines()) == 2 + 2 + len(MENDS)
     assert "| without timed | 0 % (0-11) | 0/10, 0/10, 0/10 |" in text
     assert (runs / "ablation.png").stat().st_size > 5000
+    assert (runs / "ablation.md").read_text(encoding="utf-8") == text
 
 
 def test_bars_and_their_whiskers_are_rates_and_intervals():

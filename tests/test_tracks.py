@@ -111,6 +111,27 @@ def test_an_object_of_the_backgrounds_colour_is_as_large_as_flow_looks_about_its
     assert elsewhere.sum() == 25 and elsewhere[60, 30]
 
 
+@pytest.mark.parametrize(
+    ("beside", "counts"),
+    [
+        ((-2, 0), True),
+        ((9, 0), True),
+        ((0, -2), True),
+        ((0, 8), True),
+        ((-3, 0), False),
+        ((0, 9), False),
+    ],
+)
+def test_a_point_is_the_objects_that_is_two_pixels_beside_it(beside, counts):
+    """The object has left 8 x 7 pixels; else a square about the point stands in for it."""
+    first = np.full((84, 84, 3), 100, np.uint8)
+    last = first.copy()
+    first[40:47, 30:38] = last[40:47, 50:58] = 200
+    point = np.array([[30.0, 40]]) + beside
+    found = tracks.silhouette(first, last, np.array([20.0, 0]), point)
+    assert (found.sum() == 56) == counts
+
+
 @pytest.mark.parametrize("d", [(20, 0), (0, 15), (20, -12), (-9, 9)])
 def test_the_objects_pixels_are_found_whichever_way_it_goes(d):
     first = np.full((84, 84, 3), 100, np.uint8)
