@@ -176,14 +176,51 @@ def test_a_lamp_that_swings_at_the_edge_is_no_arm(room):
     assert reason in footage.check(film).doubt[0]
 
 
-@pytest.mark.parametrize(("share", "two"), [(0.04, False), (0.06, True)])
-def test_arms_from_both_sides_in_a_twentieth_of_the_frames_are_two_people(
-    room, share, two, monkeypatch
+@pytest.mark.parametrize(("often", "two"), [(2, False), (3, True)])
+@pytest.mark.parametrize("seen", ["_doors", "_beside"])
+def test_arms_at_two_places_in_a_twentieth_of_the_frames_are_two_people(
+    room, seen, often, two, monkeypatch
 ):
-    both = np.array([[0.0, 1.0 if i % 100 < 100 * share else 0.95] for i in range(100)])
-    monkeypatch.setattr(footage, "_doors", lambda moves: both)
+    """From both sides, or beside each other, in so many of sixty frames."""
+    both = np.arange(60) < often
+    doors = np.stack([0 * both, np.where(both, 1.0, 0.95)], 1)
+    monkeypatch.setattr(footage, seen, lambda moves: doors if seen == "_doors" else both)
     doubt = footage.check(arms(room, "left", frames=60)).doubt
     assert ("several people" in doubt[0]) if two else doubt is None
+
+
+@pytest.mark.parametrize(
+    ("boxes", "two"),
+    [
+        ([(10, 0, 12, 12), (32, 0, 12, 12)], True),  # from above, 10 pixels apart
+        ([(10, 0, 12, 12), (30, 0, 12, 12)], False),  # 8: a twelfth of the width
+        ([(0, 20, 12, 12), (40, 0, 12, 12)], True),  # from the left and from above
+        ([(10, 0, 12, 12), (32, 0, 8, 8)], False),  # less than a hundredth of the picture
+        ([(10, 0, 12, 12), (32, 10, 12, 12)], False),  # over no edge
+        ([(10, 0, 12, 12)], False),
+    ],
+)
+def test_two_arms_beside_each_other_are_a_tenth_of_the_width_apart(boxes, two):
+    assert footage._beside(moving(*boxes)[None]).tolist() == [two]
+
+
+@pytest.mark.parametrize(
+    ("size", "frames", "small"), [(4, 20, True), (3, 20, False), (4, 1, False)]
+)
+def test_a_small_thing_that_moves_by_itself_is_no_arm_and_noise_is_nothing(size, frames, small):
+    """Of sixteen pixels in one piece, and of nine."""
+    moves = np.zeros((60, 84, 84), bool)
+    moves[:frames, 40 : 40 + size, 40 : 40 + size] = True
+    moves[:, ::5, ::5] = True  # noise
+    assert footage._speck(moves) == small
+
+
+def test_a_thing_that_moves_without_an_arm_is_told_from_a_room_in_which_nothing_does(room):
+    film = np.repeat(room[None], 30, 0).copy()
+    for i, frame in enumerate(film):
+        frame[70:78, 40 + i : 48 + i] = (200, 40, 30)
+    with pytest.raises(Unusable, match="no arm is seen, only something small moves; film from"):
+        footage.check(film)
 
 
 @pytest.mark.parametrize(

@@ -25,8 +25,11 @@ LARGE = 0.015  # of the picture: less that moves is no arm
 COVERS = 0.04  # of the picture: a lamp that swings at its edge covers half of that, an arm twice
 EDGE = 3  # pixels from the picture's edge, over which an arm comes in
 FAINT = 10  # grey levels: at the shoulder an arm moves by little
+SPECK = 0.0015  # of the picture, 10 pixels in one piece: noise moves a few, each by itself
 SOMETIMES = 2  # frames in which something moves: noise does so in one
 APART = 1.0  # of the width, from edge to edge: between them a lamp may hang beside an arm
+SECOND = 0.01  # of the picture: the least of two arms that come in beside each other
+BETWEEN = 0.1  # of the width, that lies between them: an arm and its drawer have half of that
 OFTEN = 0.05  # of the frames: an arm at its median place is not told from the room
 ENDS = 16  # a clip's first and last frames are so many of it
 
@@ -59,6 +62,8 @@ def check(frames: np.ndarray, cuts: Sequence[int] = ()) -> Footage:
         )
     still, background, moving = before_background(frames[first:last])
     if not moving:
+        if _speck(np.abs(still - background) > MOVED):
+            raise Unusable("no arm is seen, only something small moves", SIDE_ON)
         raise Unusable("nothing moves in the clip", "film an arm that does the task")
     frames, warnings = _steadied(frames, shots, shots.index((first, last)))
     if warnings:
@@ -67,18 +72,18 @@ def check(frames: np.ndarray, cuts: Sequence[int] = ()) -> Footage:
     doors = _doors(off > MOVED)
     # At its median place an arm looks like the room.
     enters = float(np.nanmean(doors)) if np.isfinite(doors).any() else np.nan
-    doubt = _doubt(_comes_in(off > FAINT), doors)
+    doubt = _doubt(_comes_in(off > FAINT), doors, _beside(off > MOVED))
     return Footage(frames, warnings, enters, _unmoved(still), doubt)
 
 
-def _doubt(comes_in, doors):
+def _doubt(comes_in, doors, beside):
     """Why the clip may show no arm, or several people, and the remedy; None if it shows one."""
     if not comes_in:
         return "no arm is seen, nothing large that moves comes in from the edge", SIDE_ON
-    if (np.nan_to_num(np.ptp(doors, axis=1)) >= APART).mean() > OFTEN:
+    if ((np.nan_to_num(np.ptp(doors, axis=1)) >= APART) | beside).mean() >= OFTEN:
         return (
-            "arms come in over opposite edges of the picture, as of several people, or of one who "
-            "fills it",
+            "arms come in at two places far apart, as of several people, or of one who fills the "
+            "picture",
             "film one arm, without the body, and let nothing else move near the edges",
         )
     return None
@@ -133,6 +138,27 @@ def _doors(moves):
         x += [0] * bool(inside[:, :EDGE].any()) + [SMALL - 1] * bool(inside[:, -EDGE:].any())
         if x:
             out[t] = min(x) / (SMALL - 1), max(x) / (SMALL - 1)
+    return out
+
+
+def _speck(moves):
+    """Whether a small thing, and not noise, is among what moves (T, 84, 84)."""
+    pieces = (cv2.connectedComponentsWithStats(moved.astype(np.uint8))[2] for moved in moves)
+    large = [piece[1:, 4].max(initial=0) >= SPECK * SMALL**2 for piece in pieces]
+    return sum(large) >= SOMETIMES
+
+
+def _beside(moves):
+    """In which frames (T,) bool of what moves (T, 84, 84) two arms come in beside each other, over
+    the left, right or upper edge."""
+    out = np.zeros(len(moves), bool)
+    for t, moved in enumerate(moves):
+        _, stats = things(moved)
+        x, y, width, _, area = stats.T
+        comes = (np.minimum(x, y) <= EDGE) | (x + width >= SMALL - EDGE)
+        arms = stats[comes & (area >= SECOND * SMALL**2)]
+        spans = sorted((x, x + width) for x, _, width, *_ in arms.tolist())
+        out[t] = any(b[0] - a[1] >= BETWEEN * SMALL for a, b in pairwise(spans))
     return out
 
 
