@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from toy_clips import room
 
-from lbw_minimal.clips.outline import far_end
+from lbw_minimal.clips.detector import Found
+from lbw_minimal.clips.outline import far_end, reaching
 
 H, W = 168, 252  # two and three pixels for one of the 84 by 84 in which it is looked for
 DEPTHS = np.concatenate([np.zeros(10), np.linspace(10, 160, 30)]).round().astype(int)
@@ -52,3 +53,54 @@ def test_what_moves_and_does_not_come_in_over_an_edge_is_no_arm():
     for t in range(10, 30):
         frames[t, 60 + 2 * t : 110 + 2 * t, 60 : 120 + 2 * t] = (220, 170, 140)
     assert not far_end(frames)[1].any()
+
+
+@pytest.mark.parametrize(
+    ("share", "way", "outline"),
+    [(0.45, 80, True), (0.55, 80, False), (1, 16, True), (1, 18, False)],
+    ids=["rarely", "often", "rests", "goes"],
+)
+def test_a_tip_that_is_rarely_sure_or_rests_while_an_arm_comes_in_is_not_believed(
+    share, way, outline
+):
+    """From when the arm is inside, at a share of the frames; a way from its first to its last
+    quarter, of which a tenth of the picture's shorter side, 168 pixels, is enough."""
+    frames = comes_in("left")
+    tip, inside = far_end(frames)
+    sure = np.zeros(len(frames))
+    sure[np.flatnonzero(inside)[: round(share * inside.sum())]] = 1
+    along = np.flatnonzero(sure)
+    path = np.zeros((len(frames), 2))
+    path[along, 0] = np.where(np.arange(len(along)) < len(along) / 2, 0, way)
+    found = reaching(frames, Found(path, path + 1, sure, sure))
+    assert np.array_equal(found.tip, tip if outline else path)
+    assert np.array_equal(found.tip_sure, inside if outline else sure)
+    assert np.array_equal(found.object, path + 1)
+
+
+def test_where_no_arm_comes_in_the_tip_is_as_it_was_found():
+    frames = np.repeat(room(H, W)[None], 30, axis=0)
+    found = Found(*[np.ones((30, 2))] * 2, *[np.zeros(30)] * 2)
+    assert reaching(frames, found) is found
+    stirs = comes_in("left", np.where(np.arange(40) < 30, 0, 100))  # in a quarter of the frames
+    found = Found(*[np.ones((40, 2))] * 2, *[np.zeros(40)] * 2)
+    assert reaching(stirs, found) is found
+
+
+def found_at(sure):
+    """A tip that rests, as sure as that in each frame."""
+    return Found(*[np.ones((len(sure), 2))] * 2, sure.astype(float), np.zeros(len(sure)))
+
+
+def test_a_hand_that_stirs_at_one_place_does_not_say_that_the_tip_rests_elsewhere():
+    stays = found_at(np.ones(40))
+    assert reaching(comes_in("left", np.where(np.arange(40) < 10, 0, 100)), stays) is stays
+    goes = comes_in("left")
+    assert reaching(goes, stays) is not stays
+
+
+def test_a_tip_that_is_sure_before_an_arm_is_inside_says_nothing():
+    """Twenty frames of an empty room, and then a hand that stirs at one place, without a tip."""
+    waits = np.arange(40) < 20
+    found = reaching(comes_in("left", np.where(waits, 0, 100)), found_at(waits))
+    assert found.tip_sure.tolist() == (~waits).tolist()

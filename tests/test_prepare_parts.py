@@ -205,26 +205,22 @@ def test_of_what_patches_make_of_the_looks_the_object_goes_farthest(
     assert found.tip.tolist() == [20] * 5  # the look at the two frames is surer
 
 
-@pytest.mark.parametrize(
-    ("touched", "sure", "outline"), [(False, 2, True), (False, 3, False), (True, 2, False)]
-)
-def test_a_reaching_hand_that_is_rarely_sure_is_told_by_its_outline(
-    touched, sure, outline, monkeypatch
-):
-    """Surely seen in two of ten frames, of which three are enough."""
-
+@pytest.mark.parametrize("touched", [False, True])
+def test_a_hand_that_touches_nothing_may_be_told_by_its_outline(touched, monkeypatch):
     def detect(seen):
         n = len(seen)
-        return Found(*[np.zeros((n, 2))] * 2, np.where(np.arange(n) < sure, 0.9, 0.1), np.zeros(n))
+        return Found(*[np.full((n, 2), n)] * 2, np.full(n, 0.5 if n == 2 else 0.9), np.zeros(n))
 
-    monkeypatch.setattr(prepare, "told", lambda frames: np.arange(len(frames)))
+    def outline(seen, found):
+        assert seen is frames
+        return replace(found, tip=found.tip + 1)
+
+    monkeypatch.setattr(prepare, "told", lambda frames: np.arange(2))
     monkeypatch.setattr(prepare, "mended", lambda frames, found: found)
+    monkeypatch.setattr(prepare, "reaching", outline)
     frames = np.zeros((10, 84, 84, 3), np.uint8)
-    end = np.full((10, 2), 7.0), np.arange(10) > 3
-    monkeypatch.setattr(prepare, "far_end", lambda seen: end if seen is frames else None)
     found = prepare.looked(SimpleNamespace(detect=detect), frames, touched)
-    assert found.tip[0, 0] == (7 if outline else 0)
-    assert (found.tip_sure >= 0.5).sum() == (6 if outline else sure)
+    assert found.tip[0, 0] == (10 if touched else 2 + 1)
 
 
 @pytest.mark.parametrize(

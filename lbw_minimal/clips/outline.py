@@ -1,19 +1,43 @@
 """Where the tip of a reaching hand is, told by its outline alone. Not from the paper.
 
-The detector knows arms as they were drawn, and of some real hands it is never sure. But where a
-hand touches nothing, what differs from the picture before it came is the arm, and who it belongs
-to. It comes in over an edge, and its tip is what is farthest from that edge.
+The detector knows arms as they were drawn; of some real hands it is never sure, and then it may
+take a thing at the mark for the tip. But where a hand touches nothing, what differs from the
+picture before it came is the arm, and who it belongs to. It comes in over an edge, and its tip is
+what is farthest from that edge.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from lbw_minimal.clips.detector import Found
 from lbw_minimal.clips.footage import EDGE, ENDS, LARGE, things
 from lbw_minimal.clips.motion import MOVED, SMALL, high_pass, small
+from lbw_minimal.clips.paths import SURE, TIP_FOUND, extent
+from lbw_minimal.clips.retarget import LITTLE
 
-FIRST = 60  # pixels of an edge, over which an arm has come in by when it is told which edge that is
 FAR = 0.98  # quantile: what is farther is the tip, and not a pixel of noise beyond it
+RARELY = 0.5  # of the frames in which an arm is inside: a tip that is sure in fewer is not believed
+
+
+def reaching(frames: np.ndarray, found: Found) -> Found:
+    """Found in the frames (T, H, W, 3) uint8 of a hand that touches nothing, with the tip of its
+    outline where the one that was found is rarely sure, or ends near where it began."""
+    tip, inside = far_end(frames)
+    sure, least = found.tip_sure >= SURE, LITTLE * min(frames.shape[1:3])
+    rarely = (sure & inside).sum() < RARELY * inside.sum()
+    rests = _gone(found.tip[sure]) < least < extent(tip[inside])
+    if inside.mean() < TIP_FOUND or not (rarely or rests):
+        return found
+    return replace(found, tip=tip, tip_sure=inside.astype(np.float32))
+
+
+def _gone(path):
+    """How far, in pixels, a path (n, 2) leads from its first to its last quarter; 0 if n < 4."""
+    few = len(path) // 4
+    return np.linalg.norm(np.median(path[:few], 0) - np.median(path[-few:], 0)) if few else 0.0
 
 
 def far_end(frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -47,9 +71,7 @@ def _arm(moved):
 
 
 def _side(inside):
-    """Over which edge an arm, its pixels (84, 84) in each frame, has come in first: 0 the left, 1
-    the right, 2 the upper one."""
-    over = np.array([(a[:, :EDGE].sum(), a[:, -EDGE:].sum(), a[:EDGE].sum()) for a in inside])
-    counted = np.cumsum(over, axis=0)
-    enough = int((counted.sum(1) >= FIRST).argmax()) or len(over) - 1
-    return int(counted[enough].argmax())
+    """Over which edge an arm, its pixels (84, 84) in each frame, comes in with most of them: 0 the
+    left, 1 the right, 2 the upper one."""
+    over = [(a[:, :EDGE].sum(), a[:, -EDGE:].sum(), a[:EDGE].sum()) for a in inside]
+    return int(np.sum(over, axis=0).argmax())

@@ -23,10 +23,10 @@ from lbw_minimal import imitate, video
 from lbw_minimal.clips import footage
 from lbw_minimal.clips.detector import Detector, Found, refine
 from lbw_minimal.clips.motion import small, told
-from lbw_minimal.clips.outline import far_end
+from lbw_minimal.clips.outline import reaching
 from lbw_minimal.clips.page import clip_column, write_page
 from lbw_minimal.clips.patches import gone, mended
-from lbw_minimal.clips.paths import SURE, TIP_FOUND, Tracks, Unusable, jumps
+from lbw_minimal.clips.paths import Tracks, Unusable, jumps
 from lbw_minimal.clips.reader import Clip, read_clip
 from lbw_minimal.clips.retarget import FPS, Motion, Scene, lay
 from lbw_minimal.clips.stills import write_stills
@@ -244,17 +244,16 @@ def looked(model: Detector, frames: np.ndarray, touched: bool) -> Found:
 
     What rests for most of a shot is in the shot's median, and so looks like the room. Tip and
     object are each told by the look that is surer of it. Where nothing is touched a hand rests
-    longest, at its mark, and the look at what moves tells it; if that is rarely sure, the outline
-    of what moves does. Patches take the object from the tip's way: beside a wrong tip they find
-    what rests. So they ask each look, and what goes farthest is the object.
+    longest, at its mark, and the look at what moves tells it, or its outline. Patches take the
+    object from the tip's way: beside a wrong tip they find what rests. So they ask each look, and
+    what goes farthest is the object.
     """
     whole, kept = model.detect(frames), told(frames)
     last = np.searchsorted(kept, np.arange(len(frames)), side="right") - 1
     moving = Found(*(values[last] for values in vars(model.detect(frames[kept])).values()))
-    hand = moving if not touched else max(whole, moving, key=lambda one: one.tip_sure.mean())
-    if not touched and (hand.tip_sure >= SURE).mean() < TIP_FOUND:
-        tip, seen = far_end(frames)
-        hand = replace(hand, tip=tip, tip_sure=seen.astype(np.float32))
+    hand = max(whole, moving, key=lambda one: one.tip_sure.mean())
+    if not touched:
+        hand = reaching(frames, moving)
     thing = max(whole, moving, key=lambda one: one.object_sure.mean())
     surer = Found(hand.tip, thing.object, hand.tip_sure, thing.object_sure)
     looks = [surer]
