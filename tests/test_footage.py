@@ -192,15 +192,15 @@ def test_arms_at_two_places_in_a_twentieth_of_the_frames_are_two_people(
 @pytest.mark.parametrize(
     ("boxes", "two"),
     [
-        ([(10, 0, 12, 12), (32, 0, 12, 12)], True),  # from above, 10 pixels apart
-        ([(10, 0, 12, 12), (30, 0, 12, 12)], False),  # 8: a twelfth of the width
+        ([(10, 0, 12, 12), (39, 0, 12, 12)], True),  # from above, 17 pixels apart
+        ([(10, 0, 12, 12), (38, 0, 12, 12)], False),  # 16: less than a fifth of the width
         ([(0, 20, 12, 12), (40, 0, 12, 12)], True),  # from the left and from above
-        ([(10, 0, 12, 12), (32, 0, 8, 8)], False),  # less than a hundredth of the picture
-        ([(10, 0, 12, 12), (32, 10, 12, 12)], False),  # over no edge
+        ([(10, 0, 12, 12), (39, 0, 10, 10)], False),  # less than 0.015 of the picture
+        ([(10, 0, 12, 12), (39, 10, 12, 12)], False),  # over no edge
         ([(10, 0, 12, 12)], False),
     ],
 )
-def test_two_arms_beside_each_other_are_a_tenth_of_the_width_apart(boxes, two):
+def test_two_arms_beside_each_other_are_a_fifth_of_the_width_apart(boxes, two):
     assert footage._beside(moving(*boxes)[None]).tolist() == [two]
 
 

@@ -28,8 +28,9 @@ FAINT = 10  # grey levels: at the shoulder an arm moves by little
 SPECK = 0.0015  # of the picture, 10 pixels in one piece: noise moves a few, each by itself
 SOMETIMES = 2  # frames in which something moves: noise does so in one
 APART = 1.0  # of the width, from edge to edge: between them a lamp may hang beside an arm
-SECOND = 0.01  # of the picture: the least of two arms that come in beside each other
-BETWEEN = 0.1  # of the width, that lies between them: an arm and its drawer have half of that
+# Of the width, that lies between two arms beside each other: between an arm and its shadow, its
+# body or the drawer that it pushes, films of people have up to 0.2.
+BETWEEN = 0.2
 OFTEN = 0.05  # of the frames: an arm at its median place is not told from the room
 ENDS = 16  # a clip's first and last frames are so many of it
 
@@ -156,7 +157,7 @@ def _beside(moves):
         _, stats = things(moved)
         x, y, width, _, area = stats.T
         comes = (np.minimum(x, y) <= EDGE) | (x + width >= SMALL - EDGE)
-        arms = stats[comes & (area >= SECOND * SMALL**2)]
+        arms = stats[comes & (area >= LARGE * SMALL**2)]
         spans = sorted((x, x + width) for x, _, width, *_ in arms.tolist())
         out[t] = any(b[0] - a[1] >= BETWEEN * SMALL for a, b in pairwise(spans))
     return out
