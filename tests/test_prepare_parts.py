@@ -247,6 +247,27 @@ def test_a_mark_lies_in_the_picture_and_in_the_clips_seconds(mark, inside, monke
                 follow(result, choices)
 
 
+@pytest.mark.parametrize(
+    ("contact", "name", "asked"),
+    [(0.04, "", True), (0.04, "tip", True), (0.04, "object", False), (None, "", False)],
+)
+def test_a_thing_that_is_touched_has_to_be_in_sight_unless_the_user_placed_it(
+    contact, name, asked, monkeypatch
+):
+    nothing, seen = Found(np.zeros((6, 2)), np.zeros((6, 2)), np.zeros(6), np.zeros(6)), []
+    motion = SimpleNamespace(times=np.arange(4) / 10, contact=1, arrival=3)
+    monkeypatch.setattr(prepare, "look", lambda frames, cuts, touched: nothing)
+    monkeypatch.setattr(
+        prepare.footage, "check", lambda frames, cuts: Footage(frames, [], 0.5, False)
+    )
+    monkeypatch.setattr(prepare, "lay", lambda tracks, scene, mirror: motion)
+    monkeypatch.setattr(prepare, "check_sight", lambda frames, tracks, *when: seen.append(when))
+    result = prepared(scene=SimpleNamespace(contact=contact))
+    choices = Choices(**({name: ((5.0, 5.0, 0.1),)} if name else {}))
+    assert follow(result, choices) is motion
+    assert seen == ([(0.1, pytest.approx(0.3))] if asked else [])
+
+
 @pytest.mark.parametrize("name", ["", "tip", "object"])
 def test_a_user_who_places_the_tip_overrules_that_there_is_no_arm(name, monkeypatch):
     """It is searched all the same, so that the page shows what was found and can be corrected."""

@@ -22,6 +22,7 @@ import tasks
 from lbw_minimal import imitate, video
 from lbw_minimal.clips import footage
 from lbw_minimal.clips.detector import Detector, Found, refine
+from lbw_minimal.clips.hiding import check_sight
 from lbw_minimal.clips.motion import small, told
 from lbw_minimal.clips.outline import reaching
 from lbw_minimal.clips.page import clip_column, write_page
@@ -222,7 +223,11 @@ def follow(result: Prepared, choices: Choices) -> Motion:
         f"{len(frames)} frames at {rate:.3g} a second; their motion was smoothed and taken at "
         f"{FPS} a second, by the time stamps."
     )
-    return lay(tracks, result.scene, choices.mirror)
+    motion = lay(tracks, result.scene, choices.mirror)
+    if result.scene.contact is not None and not choices.object:
+        touch, there = motion.times[[motion.contact, motion.arrival]]
+        check_sight(frames, tracks, touch, there)
+    return motion
 
 
 def look(frames: np.ndarray, cuts: Sequence[int], touched: bool) -> Found:
