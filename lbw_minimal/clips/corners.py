@@ -21,6 +21,9 @@ BACK = 0.5  # pixels: a corner that comes back further off is lost
 # In 84ths of the longer side: how far from the object's middle its corners are, and how much
 # unlike its path theirs may be.
 NEAR, LIKE = 12.0, 1.5
+# A fingertip's corners go with a thing from the touch on, so the median is not enough: in four
+# fifths of the frames they may be so much unlike it.
+MOSTLY, STRAYS = 0.8, 4.0
 FARTHER = 2.0  # times the object's way, while it is found: what goes farther is another's
 CORNERS = 3  # fewer give no median
 
@@ -64,7 +67,8 @@ def objects_own(paths: np.ndarray, path: np.ndarray, unit: float) -> tuple[np.nd
         warnings.simplefilter("ignore", RuntimeWarning)
         offset = path[:, None] - paths  # (T, n, 2)
         middle = np.nanmedian(offset, axis=0)
-        unlike = np.nanmedian(np.abs(offset - middle).sum(2), axis=0)
+        off = np.abs(offset - middle).sum(2)  # (T, n)
+        unlike, most = np.nanquantile(off, [0.5, MOSTLY], axis=0)
         moved = _extent(paths)
         # The tip of a hand that has come to rest beside a thing is as like it most of the time.
         farther = _extent(paths + 0 * path[:, None]) > FARTHER * (_extent(path) + unit)
@@ -73,7 +77,8 @@ def objects_own(paths: np.ndarray, path: np.ndarray, unit: float) -> tuple[np.nd
     near = np.abs(middle).max(1) < NEAR * unit
     # Half of an object's way, and a corner of the background would be as like it.
     moves = moved > max(2 * unit, way / 4)
-    return seen & near & moves & ~farther & (unlike < LIKE * unit), middle
+    alike = (unlike < LIKE * unit) & (most < STRAYS * unit)
+    return seen & near & moves & ~farther & alike, middle
 
 
 def _extent(paths):
