@@ -147,7 +147,7 @@ DEMONSTRATION = {
 <p>Above: the human video, from left to right. Below: the same moments as the translation network
 repaints them, with the keypoints found there. Look for two things. The robot's arm should stand
 where the human's does, and the object should still be there. A dot of one colour should stay on
-the same part of the arm, or on the object, in every column.</p>
+the same part of the arm, or on the object, in every column; one or two may stay in empty air.</p>
 """,
     "avid": """
 <p>Above: the first human video, from left to right. Below: the same moments as CycleGAN repaints

@@ -287,7 +287,8 @@ def test_what_was_found_is_laid_by_the_clips_shorter_side_cuts_and_marks(monkeyp
     assert tracks.tip[2].tolist() == [10, 20] and tracks.object[4].tolist() == [30, 40]
     assert (tracks.enters, tracks.unmoved) == (0.2, True)
     assert result.warnings == ["cut at [4]"] and result.tracks is tracks
-    assert result.notes[0].startswith("6 frames at 20 a second")
+    assert result.notes[0] == "You placed the tip in 1 picture and the object in 1 picture."
+    assert result.notes[1].startswith("6 frames at 20 a second")
     for wrong in ((161.0, 20.0, 2.1), (10.0, 91.0, 2.1), (10.0, 20.0, 1.9), (10.0, 20.0, 2.3)):
         with pytest.raises(prepare.Misplaced, match=r"of 160x90 pixels and 2\.0 to 2\.2 s"):
             follow(Prepared(clip, scene), Choices(tip=(wrong,)))

@@ -1,5 +1,6 @@
 """The page of `prepare` in a browser: what a click into a frame of the clip does."""
 
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -98,6 +99,11 @@ async def look(folder):
         for click in ("'from', 1, 0.5, 0.5", "'to', 9, 0.5, 0.5", "'to', 8, 0.2, 0.5"):
             await page.js(f"({CLICK})({click})")
         states["cut"] = await page.js(STATE)
+        hidden, states["swapped"] = "document.getElementById('swapped').hidden", []
+        for click in ("'from', 2, 0.5, 0.5", "'to', 5, 0.5, 0.5", "'to', 1, 0.5, 0.5",
+                      "'from', 0, 0.5, 0.5"):  # fmt: skip
+            await page.js(f"({CLICK})({click})")
+            states["swapped"].append(await page.js(hidden))
         await page.call("Page.navigate", url=(folder / "not.html").as_uri())
         there = "location.pathname.endsWith('/not.html') && document.readyState"
         await page.until(there, "complete")
@@ -121,6 +127,7 @@ def places(state):
 
 def test_a_click_writes_an_option_and_draws_a_dot_in_the_colour_of_its_thing(seen):
     assert seen["first"] == {"command": COMMAND, "copy": "Copy", "dots": []}
+    assert seen["swapped"] == [True, True, False, True]  # hidden; alone, in order, swapped, again
     assert seen["tip"]["command"] == f"{COMMAND} --tip 80,120@0.200"
     assert places(seen["tip"]) == [("0.200", TIP, 0.25, 0.5)]
 
@@ -181,6 +188,16 @@ def test_pictures_outside_of_what_is_used_are_grey_and_say_so():
     assert ["; not used" in frame for frame in frames] == grey
     assert "tip 20% sure, object 100% sure" in frames[3]
     assert "unused" not in clip_frames(*clip())
+
+
+def test_a_picture_that_was_clicked_is_among_those_that_are_shown():
+    """Of sixty frames a dozen are shown, and the first and the last that have a click."""
+    frames, t = np.zeros((60, 90, 120, 3), np.uint8), np.arange(60) / 25
+    tracks = Tracks(t, np.full((60, 2), 50.0), np.full((60, 2), 70.0), *np.ones((2, 60)), side=90)
+    whole = clip_frames(frames, t, tracks)
+    clicked = clip_frames(frames, t, tracks.marked("tip", [(9.0, 9, t[7]), (9, 9, t[31])]))
+    times = [re.findall(r'data-time="([0-9.]+)"', text) for text in (whole, clicked)]
+    assert set(times[1]) - set(times[0]) == {"0.280", "1.240"} and times[1] == sorted(times[1])
 
 
 def test_what_the_user_placed_is_called_yours_and_no_share_of_certainty():

@@ -38,6 +38,19 @@ def test_the_verdict_counts_warnings_and_says_why_not(warnings, why_not, verdict
     assert prepared(warnings=warnings, why_not=why_not).verdict == verdict
 
 
+@pytest.mark.parametrize(
+    ("tip", "thing", "said"),
+    [
+        (0, 0, ""), (1, 0, "You placed the tip in 1 picture."),
+        (0, 3, "You placed the object in 3 pictures."),
+        (2, 1, "You placed the tip in 2 pictures and the object in 1 picture."),
+    ],
+)  # fmt: skip
+def test_what_a_user_placed_is_said(tip, thing, said):
+    marks = [(1.0, 2.0, float(i)) for i in range(3)]
+    assert Choices(tip=tuple(marks[:tip]), object=tuple(marks[:thing])).placed == said
+
+
 def test_a_usable_clip_is_told_with_its_warnings_and_how_to_learn_from_it(
     tmp_path, monkeypatch, capsys
 ):

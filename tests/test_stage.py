@@ -38,6 +38,12 @@ def test_outlines_lie_where_the_picture_changes(name):
     env.close()
 
 
+def test_what_the_page_fills_in_itself_is_left_to_it():
+    """Of `${size}` the size of the kit's pictures had been put in: every film had $84 MB."""
+    text = page("push")
+    assert "${megabytes} MB" in text and not re.search(r"\$\d", text)
+
+
 @pytest.mark.parametrize("name", tasks.TASKS)
 def test_the_goal_is_drawn_where_the_object_has_to_get(name):
     text = page(name)

@@ -36,7 +36,8 @@ OPTIONS = [
     ("--mirror, --no-mirror", "turn left into right, or do not"),
     (
         "--tip X,Y@S",
-        "the tip, the point that pushes, is at these pixels of the clip at that second",
+        "the tip, the point that pushes, is at these pixels of the pictures above at that second, "
+        "which are {width}x{height}: large clips are read smaller. A click writes it",
     ),
     ("--object X,Y@S", "and the object at these"),
 ]
@@ -110,7 +111,9 @@ def write_page(
         page += section("The motion in the scene", SCENE, picture(svg(figure), "Paths over time"))
     again = "" if clickable else f"<pre>{escape(command)}</pre>"
     options = OPTIONS[: 1 if clickable and tracks is None else None]  # no other is of any help
-    page += section("To decide otherwise", table(options), again)
+    height, width = frames.shape[1:3]
+    said = [(name, text.format(width=width, height=height)) for name, text in options]
+    page += section("To decide otherwise", table(said), again)
     if learn:
         page += section("Next", FIRST, "<p>The robot learns it:</p>", f"<pre>{escape(learn)}</pre>")
     title = f"{escape(task)}: a clip of one's own"

@@ -309,7 +309,8 @@ def ends(path: np.ndarray, least: float, what: str) -> tuple[np.ndarray, np.ndar
 
 def never_moves(what: str, gone: float) -> Unusable:
     """The error for a hand or object, `what`, that has gone too few pixels."""
-    return Unusable(f"the {what} never moves, or by {gone:.0f} pixels only", NEARER)
+    pixels = "1 pixel" if round(gone) == 1 else f"{gone:.0f} pixels"
+    return Unusable(f"the {what} never moves, or by {pixels} only", NEARER)
 
 
 def progress(path: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:

@@ -41,22 +41,25 @@ def _dot(colour, hollow=False, ring=None):
 
 LEGEND = f"""
 <p>{_dot(TIP)} Orange is the tip, the point that pushes: a fingertip, or the foot or end of what the
-hand holds. {_dot(OBJECT)} Sky blue is the object, the thing that is pushed. A full dot was surely
-found, a hollow one {_dot(TIP, True)} {_dot(OBJECT, True)} was not; "yours" is where you clicked,
-and between your clicks. Grey pictures are not used.</p>
+hand holds. {_dot(OBJECT)} Sky blue is the object, the thing that is pushed. Of a full dot the
+network is sure, and may be wrong all the same: look at each. Of a hollow one {_dot(TIP, True)}
+{_dot(OBJECT, True)} it is not sure. "Yours" is where you clicked, and between your clicks. Grey
+pictures are not used.</p>
 """
 CLICK = f"""
-<p>Is a dot wrong? Choose which, click where it should be, and run the command below. Another click
-into the same picture replaces the first. Two or three pictures are enough where a dot is beside its
-place: between your first and your last click the correction is interpolated. Beyond them it fades
-out: within {FADE:g} s where the dot was full, by the next full dot where it was hollow, and where
-the clip jumps. All else stays as it was found. So click also on a dot that is right, where a
-correction should end. Is a dot on something else all along? Click into every picture from just
-before it should move until the last.</p>
+<p>Is a dot wrong? Choose which, click where it should be, and run the command below.</p>
+<details><summary>How far a click reaches</summary>
+<p>Another click into the same picture replaces the first. Two or three pictures are enough where a
+dot is beside its place: between your first and your last click the correction is interpolated.
+Beyond them it fades out: within {FADE:g} s where the dot was full, by the next full dot where it
+was hollow, and where the clip jumps. All else stays as it was found. So click also on a dot that is
+right, where a correction should end. Is a dot on something else all along? Click into every picture
+from just before it should move until the last.</p></details>
 """
 CUT = """
 <p>Is a part of the clip to be left out? Choose the first or the last picture to use, and click it.
-The next page has as many pictures of what is left, closer together: so a fast hand can be clicked.
+Do so before you correct a dot: in what is left all is looked for anew, and dots that were right may
+be others. The next page has as many pictures of it, closer together: so a fast hand can be clicked.
 </p>
 """
 ONLY_CUT = """
@@ -71,6 +74,7 @@ CHOICES = {  # by the option that a click writes
 }
 SCRIPT = """
 <pre id="command"></pre>
+<p id="swapped" class="note" hidden>The last picture to use lies before the first.</p>
 <p><button id="copy">Copy</button> <button id="again">Start again</button></p>
 <script>
 const base = %s, colours = %s, marks = new Map();
@@ -78,6 +82,8 @@ const [pre, copy, again] = ["command", "copy", "again"].map(id => document.getEl
 const show = () => {
   pre.textContent = [base, ...[...marks.values()].map(mark => mark.option)].join(" ");
   copy.textContent = "Copy";
+  const [from, to] = ["from", "to"].map(key => marks.get(key)?.time);
+  document.getElementById("swapped").toggleAttribute("hidden", !(+to < +from));
   document.getElementById("first")?.toggleAttribute("hidden", !marks.size);
 };
 document.querySelectorAll(".clip img").forEach(img => img.addEventListener("click", e => {
@@ -91,7 +97,7 @@ document.querySelectorAll(".clip img").forEach(img => img.addEventListener("clic
   dot.className = "click";
   dot.style = `left: ${100 * x}%%; top: ${100 * y}%%; background: ${colours[what]}`;
   img.after(dot);
-  marks.set(key, {dot, option: `--${what} ${whole ? time : `${place}@${time}`}`});
+  marks.set(key, {dot, time, option: `--${what} ${whole ? time : `${place}@${time}`}`});
   show();
 }));
 again.addEventListener("click", () => {
@@ -146,7 +152,9 @@ def clip_frames(
     """
     figures = []
     slack = 0.5 * float(np.median(np.diff(times))) if used else 0.0
-    for i in spread(len(times), FRAMES):
+    clicked = [t for _, *ends in tracks.yours for t in ends] if tracks else []
+    clicks = [int(np.abs(times - t).argmin()) for t in clicked]
+    for i in sorted({*spread(len(times), FRAMES).tolist(), *clicks}):
         t, image = times[i], drawn(frames[i], tracks, i)
         file = cv2.imencode(".webp", image[..., ::-1])[1].tobytes()
         size = f'data-width="{frames.shape[2]}" data-height="{frames.shape[1]}"'
@@ -180,6 +188,8 @@ def drawn(frame: np.ndarray, tracks: Tracks | None = None, i: int = 0) -> np.nda
             x, y = (scale * getattr(tracks, name)[i]).tolist()
             sure = getattr(tracks, f"{name}_sure")[i] >= SURE
             at = round(16 * x), round(16 * y)
-            for radius, ink, wide in ((7, (255, 255, 255), -1), (5, paint, -1)):
-                cv2.circle(small, at, 16 * radius, ink, wide if sure else 2, cv2.LINE_AA, shift=4)
+            # The tip's dot is smaller: over the object's it leaves a ring of that.
+            outer = 7 if name == "object" else 5
+            for radius, ink in ((outer, (255, 255, 255)), (outer - 2, paint)):
+                cv2.circle(small, at, 16 * radius, ink, -1 if sure else 1, cv2.LINE_AA, shift=4)
     return small

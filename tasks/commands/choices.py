@@ -12,7 +12,7 @@ from tasks.commands import Parser, within
 
 WHERE = "as a click into the page writes it; may be given several times"
 
-Mark = tuple[float, float, float]  # x, y in pixels of the clip, s
+Mark = tuple[float, float, float]  # x, y in pixels of the clip as it was read, s
 
 
 @dataclass(frozen=True)
@@ -33,6 +33,13 @@ class Choices:
         for name, marks in (("tip", self.tip), ("object", self.object)):
             said += [f"--{name} {x:g},{y:g}@{s:g}" for x, y, s in marks]
         return " ".join(said)
+
+    @property
+    def placed(self) -> str:
+        """A sentence on what the user placed; "" if that is nothing."""
+        counts = [("tip", len(self.tip)), ("object", len(self.object))]
+        said = [f"the {name} in {n} picture{'s'[: n - 1]}" for name, n in counts if n]
+        return f"You placed {' and '.join(said)}." if said else ""
 
 
 def parser() -> Parser:

@@ -209,7 +209,7 @@ def follow(result: Prepared, choices: Choices) -> Motion:
         min(height, width), tuple(clip.cuts), seen.enters, seen.unmoved,
     )  # fmt: skip
     tracks = tracks.marked("tip", list(choices.tip)).marked("object", list(choices.object))
-    result.tracks = tracks
+    result.tracks, result.notes = tracks, result.notes + [choices.placed] * bool(choices.placed)
     if seen.doubt:
         if not choices.tip:
             raise Unusable(*seen.doubt)

@@ -180,8 +180,8 @@ function show(blob, name) {
   at("film").play();
   Object.assign(at("save"), {href: url, download: name});
   at("clip").textContent = name;
-  const size = (blob.size / 1e6).toFixed(1);
-  state("recorded", `Recorded, ${size} MB. Look at it, a tap stops it, and save it.`);
+  const megabytes = (blob.size / 1e6).toFixed(1);
+  state("recorded", `Recorded, ${megabytes} MB. Look at it, a tap stops it, and save it.`);
 }
 
 at("record").onclick = record;
