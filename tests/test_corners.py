@@ -22,12 +22,11 @@ def test_a_corner_that_goes_less_than_a_quarter_of_the_objects_way_is_not_its(sh
 @pytest.mark.parametrize(
     ("apart", "off", "own"), [(3, 9, True), (5, 9, False), (5, 4.5, False), (5, 3.5, True)]
 )
-def test_a_fingertips_corner_that_comes_to_the_object_and_goes_along_is_not_its(apart, off, own):
-    """Of twenty frames so many away from the object, and with it from there on; where the
-    detector errs in as few as a seventh of them, the object's own corner is off as well."""
-    path = np.stack([np.r_[np.full(8, 20.0), np.linspace(20, 60, 12)], np.full(20, 40.0)], 1)
+def test_a_corner_is_the_objects_if_it_goes_along_in_four_fifths_of_the_frames(apart, off, own):
+    """In so many of the last ten of twenty frames it is beside it; three are a seventh of all."""
+    path = np.stack([np.linspace(20, 60, 20), np.full(20, 40.0)], 1)
     corner = path + (2, -1)
-    corner[:apart, 1] -= off
+    corner[10 : 10 + apart, 1] -= off
     is_own, _ = objects_own(corner[:, None], path, 1.0)
     assert is_own.tolist() == [own]
 

@@ -743,12 +743,20 @@ def test_a_corner_is_the_objects_if_it_goes_a_quarter_of_its_way_and_two_pixels(
 
 @pytest.mark.parametrize(("goes", "is_own"), [(9.5, True), (10.5, False)])
 def test_what_goes_twice_as_far_as_the_object_and_two_pixels_is_not_its_own(goes, is_own):
-    """A tip that comes and rests beside a thing that stirs by 4 is like it most of the time."""
+    """The object stirs by 4 in the end, and what is beside it goes away then."""
     path = np.stack([20 + 4.0 * (np.arange(9) == 8), np.full(9, 50.0)], 1)
-    corner = np.stack([20 - goes * (np.arange(9) == 0), np.full(9, 53.0)], 1)
+    corner = np.stack([20 - goes * (np.arange(9) == 8), np.full(9, 53.0)], 1)
     assert own(corner, path) == is_own
-    path[0] = np.nan  # where the object is not seen it may have gone as far
+    path[8] = np.nan  # where the object is not seen it may have gone as far
     assert own(corner, path)
+
+
+@pytest.mark.parametrize(("comes", "is_own"), [(1.9, True), (2.1, False)])
+def test_what_comes_while_the_object_rests_is_not_its_own(comes, is_own):
+    """A fingertip goes with a thing of which most frames show the way, from the touch on."""
+    path = np.stack([np.maximum(20.0, 14 + 3 * np.arange(12)), np.full(12, 50.0)], 1)
+    corner = path + (0, 3) + np.array([comes, 0]) * (np.arange(12) == 0)[:, None]
+    assert own(corner, path) == is_own
 
 
 def test_a_corner_has_to_be_seen_with_the_object_in_three_frames():

@@ -40,6 +40,8 @@ def flat(value):
         return [flat(one) for one in value]
     if isinstance(value, float):
         return float(f"{value:.6g}")
+    if isinstance(value, str) and len(value) > 80:
+        return None  # a text, which may be said better
     return value if isinstance(value, str | int) else None
 
 

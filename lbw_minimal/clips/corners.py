@@ -25,6 +25,7 @@ NEAR, LIKE = 12.0, 1.5
 # fifths of the frames they may be so much unlike it.
 MOSTLY, STRAYS = 0.8, 4.0
 FARTHER = 2.0  # times the object's way, while it is found: what goes farther is another's
+RESTS = 2.0  # 84ths of the longer side: so near to its first place it has not left it
 CORNERS = 3  # fewer give no median
 
 
@@ -72,6 +73,10 @@ def objects_own(paths: np.ndarray, path: np.ndarray, unit: float) -> tuple[np.nd
         moved = _extent(paths)
         # The tip of a hand that has come to rest beside a thing is as like it most of the time.
         farther = _extent(paths + 0 * path[:, None]) > FARTHER * (_extent(path) + unit)
+        # Nor does a corner of the object move while it rests, as that of a hand that comes does.
+        away = np.abs(path - path[np.isfinite(path[:, 0]).argmax()]).max(1, keepdims=True)
+        rests = np.where(away < RESTS * unit, path, np.nan)
+        farther |= _extent(paths + 0 * rests[:, None]) > FARTHER * (_extent(rests) + unit)
     way = _extent(path)
     seen = np.isfinite(offset[..., 0]).sum(0) >= 3
     near = np.abs(middle).max(1) < NEAR * unit
