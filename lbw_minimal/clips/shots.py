@@ -189,7 +189,7 @@ def drawn(frame: np.ndarray, tracks: Tracks | None = None, i: int = 0) -> np.nda
             sure = getattr(tracks, f"{name}_sure")[i] >= SURE
             at = round(16 * x), round(16 * y)
             # The tip's dot is smaller: over the object's it leaves a ring of that.
-            outer = 7 if name == "object" else 5
+            outer = 7 if name == "object" else 6
             for radius, ink in ((outer, (255, 255, 255)), (outer - 2, paint)):
                 cv2.circle(small, at, 16 * radius, ink, -1 if sure else 1, cv2.LINE_AA, shift=4)
     return small
