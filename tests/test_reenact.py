@@ -236,7 +236,9 @@ def test_a_push_that_fails_is_done_again_at_two_thirds_of_the_pace(monkeypatch):
     done = reenact(env, motion)
     assert env.begun == 1  # a scene is told as it is after a reset
     assert done.motion.tip[:, 0].tolist() == pytest.approx([0, 2 / 3, 4 / 3, 2, 2, 2])
-    assert "1.5 times slower" in done.warnings[0] and "+2.0 cm" in done.notes[0]
+    assert "1.5 times slower" in done.warnings[0] and "aims 2.0 cm farther" in done.notes[0]
+    monkeypatch.setattr(module, "_measured_push", lambda env, motion: (-0.02, True))
+    assert "aims 2.0 cm less far than the clip's hand" in reenact(env, motion).notes[0]
     monkeypatch.setattr(module, "_measured_push", lambda env, motion: (0.009, True))
     done = reenact(Table(SCENE), motion)
     assert done.motion is motion and not done.notes + done.warnings

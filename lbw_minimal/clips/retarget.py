@@ -247,7 +247,9 @@ def _left_out(t, first, last):
     head, tail = (first - 1) / FPS, (len(t) - last) / FPS
     notes = []
     if head > REST:
-        notes.append(f"The first {head:.1f} s, before the hand moves in the scene, are left out.")
+        notes.append(
+            f"The first {head:.1f} s, before the hand moves within the robot's reach, are left out."
+        )
     if tail > REST:
         notes.append(f"The last {tail:.1f} s, after the end, are left out.")
     return notes

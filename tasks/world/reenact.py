@@ -58,7 +58,11 @@ def reenact(env: TaskEnv, motion: Motion) -> Reenactment:
             further, done = _measured_push(env, motion)
             warnings.append(f"Done at the clip's pace it fails: it is done {SLOWER} times slower.")
         if abs(further) > CLOSE:
-            notes.append(f"The hand's goal goes {100 * further:+.1f} cm farther than the object.")
+            way = "farther" if further > 0 else "less far"
+            notes.append(
+                f"The simulated hand aims {100 * abs(further):.1f} cm {way} than the clip's hand "
+                "went, so that the object stops at the goal."
+            )
     frames, pixels, recording = film(env, 0, commands(env, motion, further))
     if not recording.success[-1]:
         off = 100 * np.linalg.norm(recording.states[-1, 3:6] - recording.states[-1, 6:9])
