@@ -73,14 +73,15 @@ def test_the_page_says_what_to_do_and_asks_nobody_for_anything(tmp_path, capsys)
 
 @pytest.mark.skipif(not browser.CHROMIUM, reason="needs Chromium")
 def test_a_browser_records_what_its_camera_sees(tmp_path):
-    """A file stands in for the camera: a white square that goes right, 640 x 480."""
+    """A file stands in for the camera: a white square that goes right, 640 x 360. The stage has the
+    camera's shape, so that no outline lies beside the picture."""
     (tmp_path / "push.html").write_text(page("push"), encoding="utf-8")
-    film = np.full((25, 480, 640, 3), 90, np.uint8)
+    film = np.full((25, 360, 640, 3), 90, np.uint8)
     for t, frame in enumerate(film):
         frame[200:260, 120 + 14 * t : 180 + 14 * t] = 240
     yuv = (cv2.cvtColor(frame, cv2.COLOR_RGB2YUV_I420).tobytes() for frame in film)
     (tmp_path / "camera.y4m").write_bytes(
-        b"YUV4MPEG2 W640 H480 F25:1 Ip A1:1 C420\n" + b"".join(b"FRAME\n" + f for f in yuv)
+        b"YUV4MPEG2 W640 H360 F25:1 Ip A1:1 C420\n" + b"".join(b"FRAME\n" + f for f in yuv)
     )
     camera = ("--use-fake-device-for-media-stream", "--use-fake-ui-for-media-stream",
               f"--use-file-for-fake-video-capture={tmp_path / 'camera.y4m'}")  # fmt: skip
@@ -92,9 +93,14 @@ def test_a_browser_records_what_its_camera_sees(tmp_path):
             reader.readAsDataURL(blob);
         }))"""
 
+    shape = """["#live", ".stage"].map(what => document.querySelector(what))
+        .map(one => one.videoWidth ? one.videoWidth / one.videoHeight
+                                   : one.offsetWidth / one.offsetHeight)"""
+
     async def record():
         async with browser.opened(tmp_path / "push.html", tmp_path / "profile", *camera) as shown:
             await shown.until(state, "live")
+            assert await shown.js(shape) == pytest.approx([16 / 9, 16 / 9], rel=0.01)
             await shown.js(click.format("record"))
             await shown.until(state, "recording")
             await asyncio.sleep(3)

@@ -39,7 +39,7 @@ PAGE = """<!DOCTYPE html>
 body { margin: 0 auto; max-width: 60rem; padding: 1rem; font: 1rem/1.5 system-ui, sans-serif }
 h1 { font-size: 1.5rem; margin: .3rem 0 .6rem }
 .stage { position: relative; background: #000; aspect-ratio: 4 / 3; border-radius: 8px;
-         overflow: hidden }
+         margin: 0 auto; overflow: hidden }
 .stage video, .stage svg { position: absolute; inset: 0; width: 100%; height: 100%;
          object-fit: contain }
 .stage svg { pointer-events: none; opacity: var(--shown, .9) }
@@ -138,6 +138,9 @@ async function start(id) {
   }
   at("live").srcObject = stream;
   await at("live").play();
+  const {videoWidth: width, videoHeight: height} = at("live");
+  const stage = document.querySelector(".stage");  // all of it is the camera's picture
+  Object.assign(stage.style, {aspectRatio: width / height, maxWidth: `${80 * width / height}vh`});
   const now = stream.getVideoTracks()[0].getSettings().deviceId;
   const all = await navigator.mediaDevices.enumerateDevices();
   const cameras = all.filter(device => device.kind === "videoinput");
