@@ -22,7 +22,7 @@ import tasks
 from lbw_minimal import imitate, video
 from lbw_minimal.clips import footage
 from lbw_minimal.clips.detector import Detector, Found, refine
-from lbw_minimal.clips.hiding import check_sight
+from lbw_minimal.clips.hiding import unlike
 from lbw_minimal.clips.motion import small, told
 from lbw_minimal.clips.outline import reaching
 from lbw_minimal.clips.page import clip_column, write_page
@@ -226,7 +226,7 @@ def follow(result: Prepared, choices: Choices) -> Motion:
     motion = lay(tracks, result.scene, choices.mirror)
     if result.scene.contact is not None and not choices.object:
         touch, there = motion.times[[motion.contact, motion.arrival]]
-        check_sight(frames, tracks, touch, there)
+        result.warnings += unlike(frames, tracks, touch, there)
     return motion
 
 
