@@ -45,17 +45,17 @@ def connect(kit: tuple[str, ...] = KIT) -> Any:
     ray = _ray()
     if not ray.is_initialized():
         os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
-        os.environ.setdefault("RAY_enable_autoscaler_v2", "1")  # the first takes a second to end
         os.environ.setdefault("RAY_OVERRIDE_RUNTIME_ENV_DEFAULT_EXCLUDES", "")  # ours say it all
         others = [f"/{path.name}" for path in ROOT.iterdir() if path.name not in kit]
         there: dict[str, Any] = {"working_dir": str(ROOT), "excludes": others}
         there["py_modules"] = [str(LEAN / "rfc3987_syntax")]
+        quiet: dict[str, Any] = {"logging_level": "warning", "log_to_driver": False}
         try:
-            ray.init(address="auto", runtime_env=there, logging_level="warning")
+            ray.init(address="auto", runtime_env=there, **quiet)
         except ConnectionError:
             with on_path(LEAN, ROOT):  # a local one finds the kit where it is
                 try:
-                    ray.init(address="local", include_dashboard=False, logging_level="warning")
+                    ray.init(address="local", include_dashboard=False, **quiet)
                 except Exception as e:  # Ray raises no narrower one
                     raise _error(f"Ray does not start here: {e}") from e
     return ray
