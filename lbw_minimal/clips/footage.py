@@ -155,12 +155,16 @@ def _beside(moves):
     out = np.zeros(len(moves), bool)
     for t, moved in enumerate(moves):
         _, stats = things(moved)
-        x, y, width, _, area = stats.T
-        comes = (np.minimum(x, y) <= EDGE) | (x + width >= SMALL - EDGE)
-        arms = stats[comes & (area >= LARGE * SMALL**2)]
+        arms = stats[from_outside(stats) & (stats[:, 4] >= LARGE * SMALL**2)]
         spans = sorted((x, x + width) for x, _, width, *_ in arms.tolist())
         out[t] = any(b[0] - a[1] >= BETWEEN * SMALL for a, b in pairwise(spans))
     return out
+
+
+def from_outside(stats: np.ndarray) -> np.ndarray:
+    """Which (n,) bool of `things` reach over the left, the right or the upper edge."""
+    x, y, width = stats.T[:3]
+    return (np.minimum(x, y) <= EDGE) | (x + width >= SMALL - EDGE)
 
 
 def things(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

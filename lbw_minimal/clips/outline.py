@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from lbw_minimal.clips.detector import Found
-from lbw_minimal.clips.footage import EDGE, ENDS, LARGE, things
+from lbw_minimal.clips.footage import EDGE, ENDS, LARGE, from_outside, things
 from lbw_minimal.clips.motion import MOVED, SMALL, high_pass, small
 from lbw_minimal.clips.paths import SURE, TIP_FOUND, extent
 from lbw_minimal.clips.retarget import LITTLE
@@ -63,8 +63,7 @@ def far_end(frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _arm(moved):
     """The pixels that moved (84, 84) of the largest thing that comes in over an edge, or none."""
     labels, stats = things(moved)
-    comes = (stats[:, :2].min(1) <= EDGE) | (stats[:, 0] + stats[:, 2] >= SMALL - EDGE)
-    area = np.where(comes, stats[:, 4], 0)
+    area = np.where(from_outside(stats), stats[:, 4], 0)
     if area.max(initial=0) < LARGE * SMALL**2:
         return np.zeros_like(moved)
     return moved & (labels == 1 + area.argmax())
