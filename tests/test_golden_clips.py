@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 
-from lbw_minimal.clips import decoding, footage, hdr, lookalike, reader, stills, upright
+from lbw_minimal.clips import arms, decoding, footage, hdr, lookalike, reader, stills, upright
 from lbw_minimal.clips.decoding import Decoder, Stream, look
 from lbw_minimal.training import InputError
 from tests.toy_chance import cells
@@ -267,10 +267,11 @@ def test_times_are_put_in_order_and_taken_25_times_a_second_as_they_were(golden)
 # What moves, and where an arm comes in
 
 
-def test_arms_come_in_where_they_did(golden):
+def test_things_hang_together_and_are_at_an_edge_as_they_were(golden):
     """Blobs at each edge, large and small, near and off it, and gaps of 8 and 9 pixels."""
-    rng, moves = np.random.default_rng(0), np.zeros((24, 84, 84), bool)
-    for t, moved in enumerate(moves):
+    rng, figures = np.random.default_rng(0), {}
+    for t in range(0, 24, 4):
+        moved = np.zeros((84, 84), bool)
         x, y = rng.integers(0, 70, 2)
         w, h = rng.integers(4, 40, 2)
         moved[y % 12 : y % 12 + h, x : x + w] = True
@@ -278,29 +279,29 @@ def test_arms_come_in_where_they_did(golden):
         moved[80:, 84 - t :] = True
         moved[30:50, 76 - t % 9 :] |= t % 3 == 0
         moved[8:30, 60 : 78 + t % 7] |= t % 4 == 1
-        moved[t % 5 : 30, 30:44] |= t % 4 == 3
-    near = np.zeros((15, 84, 84), bool)  # a block, so many pixels off each edge
-    for off in range(5):
-        near[off, 20:40, off : off + 20] = True
-        near[5 + off, 20:40, 64 - off : 84 - off] = True
-        near[10 + off, off : off + 20, 20:40] = True
-    doors, figures = footage._doors(np.concatenate([moves, near])), {}
-    for t in range(0, 24, 4):
-        labels, stats = footage.things(moves[t])
-        figures[f"things {t}"] = [labels.max(), *stats.ravel()]
-    few = [footage._comes_in(moves[a:b]) for a in range(0, 24, 3) for b in (a + 1, a + 2, a + 5)]
+        labels, stats = footage.things(moved)
+        figures[f"things {t}"] = [labels.max(), *stats.ravel(), *footage.from_outside(stats)]
     at = [
-        footage._at_edge(*box)
+        footage.at_edge(*box)
         for box in (
-            (3, 9, 9, 9),
-            (4, 9, 9, 9),
-            (9, 3, 9, 9),
-            (9, 9, 72, 9),
-            (9, 9, 71, 9),
-            (9, 9, 9, 72),
+            (3, 9, 9, 9), (4, 9, 9, 9), (9, 3, 9, 9), (9, 9, 72, 9), (9, 9, 71, 9), (9, 9, 9, 72),
         )
-    ]
-    golden(figures | {"doors": doors.ravel(), "comes in": few, "at edge": at})  # fmt: skip
+    ]  # fmt: skip
+    golden(figures | {"at edge": at})
+
+
+def test_arms_come_in_where_they_did(golden):
+    """Strips of all sizes and sureness, at each edge and off it."""
+    rng, masks = np.random.default_rng(0), np.zeros((40, 32, 42), np.float32)
+    for t, mask in enumerate(masks):
+        for _ in range(1 + t % 3):
+            x, y = rng.integers(0, 36), rng.integers(0, 4)
+            mask[y : y + rng.integers(4, 24), x : x + rng.integers(2, 9)] = rng.uniform(0.4, 1)
+        mask[10 : 10 + t % 7, : t % 11] = 0.9
+    figures = {str(t): np.ravel(arms._coming_in(mask)) for t, mask in enumerate(masks)}
+    off = 6.0 * np.stack([cv2.resize(mask, (84, 84)) for mask in masks]) ** 3 * 4
+    parts = [arms.count(masks[t : t + 10], off[t : t + 10]) for t in range(0, 40, 5)]
+    golden(figures | {"count": np.ravel(parts)})
 
 
 def test_a_clip_that_was_steadied_is_looked_at_again_and_only_in_its_longest_shot(monkeypatch):
@@ -313,13 +314,12 @@ def test_a_clip_that_was_steadied_is_looked_at_again_and_only_in_its_longest_sho
 
     asked = []
     monkeypatch.setattr(footage, "before_background", look_at)
-    monkeypatch.setattr(footage, "_comes_in", lambda moves: True)
     monkeypatch.setattr(
         footage, "_steadied", lambda *of: asked.append(of[1:]) or (steady, ["sways"])
     )
     seen = footage.check(frames, [10, 41])
     assert looked == [(31, 0), (31, 1)] and asked == [([(0, 10), (10, 41), (41, 50)], 1)]
-    assert seen.frames is steady and seen.warnings == ["sways"] and np.isnan(seen.enters)
+    assert seen.frames is steady and seen.warnings == ["sways"] and seen.shot == slice(10, 41)
 
 
 def test_what_stays_changed_is_told_as_it_was(golden):

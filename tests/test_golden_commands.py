@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import torch
 
+from lbw_minimal.clips.arms import Arms
 from lbw_minimal.clips.detector import Found
 from lbw_minimal.clips.footage import Footage
 from lbw_minimal.clips.reader import Clip
@@ -189,7 +190,8 @@ def test_a_clip_is_searched_with_its_marks_and_its_shorter_side_as_it_was(monkey
     monkeypatch.setattr(prepare, "look", lambda frames, cuts, touched: found(len(frames), 160))
     monkeypatch.setattr(prepare, "lay", lambda *what: laid.append(what))
     monkeypatch.setattr(prepare.footage, "check", lambda frames, cuts: Footage(
-        255 - frames, ["It trembles."], 0.3, True))  # fmt: skip
+        255 - frames, ["It trembles."], slice(None), None, True))  # fmt: skip
+    monkeypatch.setattr(prepare, "coming_in", lambda frames, off: Arms(1.0, 0.0, 0.3))
     scene = SimpleNamespace(contact=0.04, name="scene")
     result = prepare.Prepared(clip, scene, warnings=["read"])
     marks = Choices(tip=((30.0, 40.0, 1.2), (50.0, 60.0, 1.5)), object=((90.0, 60.0, 2.0),))

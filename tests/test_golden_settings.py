@@ -19,13 +19,13 @@ MODULES = {
     "lbw_minimal.clips": (
         *("detector", "detector_networks", "drawings", "drawn_shapes", "patches", "corners"),
         *("reader", "decoding", "hdr", "upright", "footage", "stills", "lookalike", "camera"),
-        *("motion", "outline", "hiding", "paths", "pushing", "retarget", "shots"),
+        *("motion", "outline", "hiding", "paths", "pushing", "retarget", "shots", "arms"),
     ),
     "tasks": tuple(tasks.TASKS),
     "tasks.world": ("arm", "bodies", "env", "motion", "reenact", "scene"),
     "tasks.commands": (
         *("eyes", "prepare", "run", "recipe", "probe", "ablation", "batch", "controls", "paper"),
-        *("robustness", "table", "translations", "stage"),
+        *("robustness", "table", "translations", "stage", "choices"),
     ),
 }
 

@@ -9,6 +9,7 @@ from toy_clips import shows
 
 from lbw_minimal import tracks, video
 from lbw_minimal.clips import page
+from lbw_minimal.clips.arms import Arms
 from lbw_minimal.clips.detector import Found
 from lbw_minimal.clips.footage import Footage
 from lbw_minimal.clips.page import write_page
@@ -271,7 +272,11 @@ def test_what_was_found_is_laid_by_the_clips_shorter_side_cuts_and_marks(monkeyp
     monkeypatch.setattr(
         prepare.footage,
         "check",
-        lambda frames, cuts: Footage(frames, [f"cut at {cuts}"], 0.2, True),
+        lambda frames, cuts: Footage(frames, [f"cut at {cuts}"], slice(1, 4), None, True),
+    )
+    shots = []
+    monkeypatch.setattr(
+        prepare, "coming_in", lambda frames, off: shots.append(len(frames)) or Arms(1.0, 0.0, 0.2)
     )
     monkeypatch.setattr(
         prepare,
@@ -285,7 +290,7 @@ def test_what_was_found_is_laid_by_the_clips_shorter_side_cuts_and_marks(monkeyp
     tracks = laid["tracks"]
     assert (tracks.side, tracks.cuts, laid["scene"], laid["mirror"]) == (90, (4,), scene, True)
     assert tracks.tip[2].tolist() == [10, 20] and tracks.object[4].tolist() == [30, 40]
-    assert (tracks.enters, tracks.unmoved) == (0.2, True)
+    assert (tracks.enters, tracks.unmoved, shots) == (0.2, True, [3])
     assert result.warnings == ["cut at [4]"] and result.tracks is tracks
     assert result.notes[0] == "You placed the tip in 1 picture and the object in 1 picture."
     assert result.notes[1].startswith("6 frames at 20 a second")

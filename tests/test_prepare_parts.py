@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from lbw_minimal.clips.arms import Arms
 from lbw_minimal.clips.detector import Found
 from lbw_minimal.clips.footage import Footage
 from lbw_minimal.clips.paths import Tracks, Unusable
@@ -15,6 +16,8 @@ from tasks.commands import prepare
 from tasks.commands.choices import Choices, parser
 from tasks.commands.links import mark
 from tasks.commands.prepare import Prepared, follow
+
+ONE, NONE = Arms(1.0, 0.0, 0.5), Arms(0.0, 0.0, np.nan)  # arms that come in
 
 
 def clip(n=6, height=90, width=160, start=0.0):
@@ -247,8 +250,9 @@ def test_a_mark_lies_in_the_picture_and_in_the_clips_seconds(mark, inside, monke
     """Six frames of 160x90 from 2 s on; the page rounds, so a hundredth of a second is let pass."""
     nothing = Found(np.zeros((6, 2)), np.zeros((6, 2)), np.zeros(6), np.zeros(6))
     monkeypatch.setattr(prepare, "look", lambda frames, cuts, touched: nothing)
+    monkeypatch.setattr(prepare, "coming_in", lambda frames, off: ONE)
     monkeypatch.setattr(
-        prepare.footage, "check", lambda frames, cuts: Footage(frames, [], 0.5, False)
+        prepare.footage, "check", lambda frames, cuts: Footage(frames, [], slice(None), None, False)
     )
     monkeypatch.setattr(prepare, "lay", lambda tracks, scene, mirror: "laid")
     for name in ("tip", "object"):
@@ -270,8 +274,9 @@ def test_a_thing_that_is_touched_should_be_in_sight_unless_the_user_placed_it(
     nothing, seen = Found(np.zeros((6, 2)), np.zeros((6, 2)), np.zeros(6), np.zeros(6)), []
     motion = SimpleNamespace(times=np.arange(4) / 10, contact=1, arrival=3)
     monkeypatch.setattr(prepare, "look", lambda frames, cuts, touched: nothing)
+    monkeypatch.setattr(prepare, "coming_in", lambda frames, off: ONE)
     monkeypatch.setattr(
-        prepare.footage, "check", lambda frames, cuts: Footage(frames, [], 0.5, False)
+        prepare.footage, "check", lambda frames, cuts: Footage(frames, [], slice(None), None, False)
     )
     monkeypatch.setattr(prepare, "lay", lambda tracks, scene, mirror: motion)
     monkeypatch.setattr(prepare, "unlike", lambda frames, tracks, *w: seen.append(w) or ["Hidden?"])
@@ -287,9 +292,9 @@ def test_a_user_who_places_the_tip_overrules_that_there_is_no_arm(name, monkeypa
     """It is searched all the same, so that the page shows what was found and can be corrected."""
     nothing = Found(np.zeros((6, 2)), np.zeros((6, 2)), np.zeros(6), np.zeros(6))
     monkeypatch.setattr(prepare, "look", lambda frames, cuts, touched: nothing)
-    doubt = "no arm is seen", "film one"
+    monkeypatch.setattr(prepare, "coming_in", lambda frames, off: NONE)
     monkeypatch.setattr(
-        prepare.footage, "check", lambda frames, cuts: Footage(frames, [], 0.5, False, doubt)
+        prepare.footage, "check", lambda frames, cuts: Footage(frames, [], slice(None), None, False)
     )
     monkeypatch.setattr(prepare, "lay", lambda tracks, scene, mirror: "laid")
     result = prepared()
@@ -297,13 +302,35 @@ def test_a_user_who_places_the_tip_overrules_that_there_is_no_arm(name, monkeypa
     if name == "tip":
         assert follow(result, choices) == "laid"
         assert result.warnings == [
-            "No arm is seen: it was searched all the same, because you placed the tip."
+            "No arm is seen, nothing large that moves comes in from the edge: it was searched all "
+            "the same, because you placed the tip."
         ]
     else:
-        with pytest.raises(Unusable, match=r"^no arm is seen; film one\.$"):
+        with pytest.raises(Unusable, match=r"^no arm is seen, .*; film from the side"):
             follow(result, choices)
         assert result.warnings == []
     assert result.tracks is not None
+
+
+@pytest.mark.parametrize(("arms", "refused"), [(NONE, True), (ONE, False)])
+def test_where_nothing_seems_to_move_an_arm_that_is_seen_does(arms, refused, monkeypatch):
+    nothing = Found(np.zeros((6, 2)), np.zeros((6, 2)), np.zeros(6), np.zeros(6))
+    monkeypatch.setattr(prepare, "look", lambda frames, cuts, touched: nothing)
+    monkeypatch.setattr(prepare, "coming_in", lambda frames, off: arms)
+    still = "nothing moves", "film an arm"
+    monkeypatch.setattr(
+        prepare.footage,
+        "check",
+        lambda frames, cuts: Footage(frames, [], slice(None), None, True, still),
+    )
+    monkeypatch.setattr(prepare, "lay", lambda tracks, scene, mirror: "laid")
+    result, marks = prepared(), Choices(tip=((5.0, 5.0, 0.1),))
+    if refused:  # and no mark helps, so nothing is searched for
+        with pytest.raises(Unusable, match=r"^nothing moves; film an arm\.$"):
+            follow(result, marks)
+        assert result.tracks is None
+    else:
+        assert follow(result, marks) == "laid"
 
 
 def test_84_pixels_are_enough_and_83_are_not(monkeypatch):

@@ -12,6 +12,7 @@ import pytest
 from lbw_minimal.clips import camera, footage, motion, paths, retarget
 from lbw_minimal.clips.paths import Tracks, interpolate, low_pass
 from lbw_minimal.clips.retarget import Scene, lay
+from tasks.commands import prepare
 from tests import toy_pushes
 from tests.toy_clips import arm, room
 from tests.toy_pushes import HIT, SCENE
@@ -277,6 +278,11 @@ def test_an_arm_comes_in_from_the_other_side_in_a_mirror():
     frames, sleeve = np.repeat(room(120, 160)[None], 40, axis=0), room(25, 160, 3)
     for frame, reach in zip(frames, np.linspace(8, 96, 40).astype(int), strict=True):
         frame[55:80, :reach] = sleeve[:, -reach:] // 2 + 90
-    one, other = footage.check(frames), footage.check(np.ascontiguousarray(frames[:, :, ::-1]))
-    assert one.enters < 0.1 and other.enters == pytest.approx(1 - one.enters, abs=0.02)
+    mirrored = np.ascontiguousarray(frames[:, :, ::-1])
+    one, other = footage.check(frames), footage.check(mirrored)
     assert (one.unmoved, one.warnings) == (other.unmoved, other.warnings)
+    arms, theirs = (
+        prepare.coming_in(f, seen.off) for f, seen in ((frames, one), (mirrored, other))
+    )
+    assert arms.enters < 0.1 and theirs.enters == pytest.approx(1 - arms.enters, abs=0.02)
+    assert arms.seen == theirs.seen and arms.moves == theirs.moves

@@ -23,9 +23,10 @@ from torch import nn
 from torch.utils.data import DataLoader, Dataset
 
 from lbw_minimal.clips.corners import followed
-from lbw_minimal.clips.detector_networks import Network, both_ways, loss, read
+from lbw_minimal.clips.detector_networks import Network, both_ways, loss, masks_both_ways, read
 from lbw_minimal.clips.drawings import draw_clip
 from lbw_minimal.clips.drawn_shapes import SIZE
+from lbw_minimal.clips.motion import some
 from lbw_minimal.images import median_frame, to_images
 from lbw_minimal.training import (
     Checkpoint,
@@ -87,6 +88,21 @@ class Detector:
             place = np.where(better[..., None], near + np.array([left, top], np.float32), place)
             sure = np.where(better, near_sure, sure)
         return Found(place[:, 0], place[:, 1], sure[:, 0], sure[:, 1])
+
+    @torch.inference_mode()
+    def arms(self, frames: np.ndarray) -> np.ndarray:
+        """How sure each cell shows an arm, (n, h, w) float32, 0 to 1, in at most 60 of the frames.
+
+        frames (T, H, W, 3) uint8: one shot. A cell is two pixels wide where the longer side has 84.
+        """
+        small, scale, (left, top) = _fitted(frames)
+        device = next(self.network.parameters()).device
+        images = to_images(with_references(some(small), references(small)), device)
+        right, bottom = (left, top) + scale * frames.shape[2:0:-1]
+        rows, columns = (
+            slice(round(a / 2), round(b / 2)) for a, b in ((top, bottom), (left, right))
+        )
+        return masks_both_ways(self.network, images)[:, 0, rows, columns].cpu().numpy()
 
     @torch.inference_mode()
     def _look(self, frames):

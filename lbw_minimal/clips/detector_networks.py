@@ -52,7 +52,7 @@ class Network(nn.Module):
         """Logits (B, 2, 42 * 42 + 1), of tip and object, and (B, 2, 42, 42), of arm and object.
 
         The first ask on which cell the middle is, the last entry standing for "nowhere"; the second
-        ask of each cell whether it shows the thing. Only training needs the second.
+        ask of each cell whether it shows the thing.
         """
         frame, around = images[:, :3], images[:, 3:]
         # What moves is 0 nowhere else: a difference is easier to learn from than two images.
@@ -99,6 +99,13 @@ def both_ways(network: Network, images: torch.Tensor) -> torch.Tensor:
     logits, mirrored = network(images)[0], network(images.flip(3))[0]
     maps = mirrored[..., :-1].unflatten(2, (CELLS, CELLS)).flip(3).flatten(2)
     return (logits + torch.cat([maps, mirrored[..., -1:]], 2)) / 2
+
+
+def masks_both_ways(network: Network, images: torch.Tensor) -> torch.Tensor:
+    """How sure each cell shows arm or object, (B, 2, 42, 42), of images (B, 12, 84, 84): the mean
+    over them and their mirror images."""
+    shown, mirrored = network(images)[1], network(images.flip(3))[1]
+    return ((shown + mirrored.flip(3)) / 2).sigmoid()
 
 
 def together(p: torch.Tensor) -> torch.Tensor:

@@ -8,11 +8,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from lbw_minimal.clips.reader import Clip
+from lbw_minimal.training import InputError
 from tasks.commands import Parser, within
 
+SLACK = 0.01  # s: the page rounds times to 0.001
 WHERE = "as a click into the page writes it; may be given several times"
 
 Mark = tuple[float, float, float]  # x, y in pixels of the clip as it was read, s
+
+
+class Misplaced(InputError):
+    """A correction names a place or a second that the clip has not."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +47,18 @@ class Choices:
         counts = [("tip", len(self.tip)), ("object", len(self.object))]
         said = [f"the {name} in {n} picture{'s'[: n - 1]}" for name, n in counts if n]
         return f"You placed {' and '.join(said)}." if said else ""
+
+    def check(self, clip: Clip) -> None:
+        """Raises Misplaced unless all that the user placed is in the clip."""
+        height, width = clip.frames.shape[1:3]
+        first, last = clip.times[0] - SLACK, clip.times[-1] + SLACK
+        for x, y, s in (*self.tip, *self.object):
+            if not (0 <= x <= width and 0 <= y <= height and first <= s <= last):
+                raise Misplaced(
+                    f"{x:g},{y:g}@{s:g} is outside of {width}x{height} pixels and "
+                    f"{clip.times[0]:.1f} to {clip.times[-1]:.1f} s; click into a frame of the "
+                    "page: it writes the place in the picture as it was read."
+                )
 
 
 def parser() -> Parser:

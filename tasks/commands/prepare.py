@@ -20,7 +20,7 @@ import numpy as np
 
 import tasks
 from lbw_minimal import imitate, video
-from lbw_minimal.clips import footage
+from lbw_minimal.clips import arms, footage
 from lbw_minimal.clips.detector import Detector, Found, refine
 from lbw_minimal.clips.hiding import unlike
 from lbw_minimal.clips.motion import small, told
@@ -35,7 +35,7 @@ from lbw_minimal.pictures import spread
 from lbw_minimal.report import COLUMNS
 from lbw_minimal.training import InputError, write_atomic
 from tasks.commands import make_folder
-from tasks.commands.choices import Choices, parser
+from tasks.commands.choices import Choices, Misplaced, parser
 from tasks.commands.links import FILM, NOTE, RUNS, folder, links, mark, noted
 from tasks.world.reenact import Reenactment, reenact
 
@@ -43,7 +43,6 @@ PAGE = "prepare.html"
 STILLS = "stills.webp"  # of a clip that was re-enacted, for the report of a run
 SHOWN = 60  # frames of the page's film, which are translated as well: 4 s of work on one core
 OWN = 12  # grey levels: the kit's own films begin with the scene's picture to within 6 of 256
-SLACK = 0.01  # s: the page rounds times to 0.001
 OWN_STEP = 0.05  # s between frames: a film that is slower has to be interpolated, as a motion
 EYES = tasks.WEIGHTS / "eyes" / "eyes.safetensors"  # the detector of tip and object
 
@@ -51,10 +50,6 @@ EYES = tasks.WEIGHTS / "eyes" / "eyes.safetensors"  # the detector of tip and ob
 def no_frames() -> np.ndarray:
     """A film (0, 84, 84, 3) of no frames."""
     return np.zeros((0, video.SIZE, video.SIZE, 3), np.uint8)
-
-
-class Misplaced(InputError):
-    """A correction names a place or a second that the clip has not."""
 
 
 @dataclass
@@ -192,28 +187,24 @@ def follow(result: Prepared, choices: Choices) -> Motion:
         raise Unusable(
             f"{width}x{height} pixels are too few", f"film at {video.SIZE}x{video.SIZE} or more"
         )
-    first, last = clip.times[0] - SLACK, clip.times[-1] + SLACK
-    for x, y, s in (*choices.tip, *choices.object):
-        if not (0 <= x <= width and 0 <= y <= height and first <= s <= last):
-            raise Misplaced(
-                f"{x:g},{y:g}@{s:g} is outside of {width}x{height} pixels and "
-                f"{clip.times[0]:.1f} to {clip.times[-1]:.1f} s; "
-                "click into a frame of the page: it writes the place in the picture as it was read."
-            )
+    choices.check(clip)
     seen = footage.check(frames, clip.cuts)
     frames = seen.frames
     result.clip, result.warnings = replace(clip, frames=frames), result.warnings + seen.warnings
+    arm = coming_in(frames[seen.shot], seen.off)
+    if seen.still and arm.seen < arms.SEEN:
+        raise Unusable(*seen.still)
     found = look(frames, clip.cuts, result.scene.contact is not None)
     tracks = Tracks(
         clip.times, found.tip, found.object, found.tip_sure, found.object_sure,
-        min(height, width), tuple(clip.cuts), seen.enters, seen.unmoved,
+        min(height, width), tuple(clip.cuts), arm.enters, seen.unmoved,
     )  # fmt: skip
     tracks = tracks.marked("tip", list(choices.tip)).marked("object", list(choices.object))
     result.tracks, result.notes = tracks, result.notes + [choices.placed] * bool(choices.placed)
-    if seen.doubt:
+    if arm.doubt:
         if not choices.tip:
-            raise Unusable(*seen.doubt)
-        reason, _ = seen.doubt
+            raise Unusable(*arm.doubt)
+        reason, _ = arm.doubt
         result.warnings.append(
             f"{reason[0].upper()}{reason[1:]}: it was searched all the same, because you placed "
             "the tip."
@@ -228,6 +219,12 @@ def follow(result: Prepared, choices: Choices) -> Motion:
         touch, there = motion.times[[motion.contact, motion.arrival]]
         result.warnings += unlike(frames, tracks, touch, there)
     return motion
+
+
+def coming_in(frames: np.ndarray, off: np.ndarray) -> arms.Arms:
+    """The arms that come into the frames of one shot, as the shipped detector sees them and by what
+    is `off` the room, see `Footage`."""
+    return arms.count(Detector.load(EYES).arms(frames), off)
 
 
 def look(frames: np.ndarray, cuts: Sequence[int], touched: bool) -> Found:

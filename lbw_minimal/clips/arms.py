@@ -1,0 +1,118 @@
+"""How many arms come into a clip, and where. Not from the paper.
+
+There are two witnesses. The detector was taught where arms are in drawings, and sees one that
+hardly moves; of some it is never sure. What moves in over an edge is an arm mostly, and sometimes a
+lamp. One of them is enough to believe in an arm, or in two.
+In: masks (n, h, w) of some of a shot's frames, as `Detector.arms` gives them: how sure each cell
+shows an arm, 0 to 1. A cell is two pixels wide in a picture whose longer side has 84. And how much
+each pixel of some frames is off the room, (T, 84, 84).
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from lbw_minimal.clips.footage import EDGE, LARGE, SOMETIMES, at_edge, things
+from lbw_minimal.clips.motion import MOVED, SMALL
+from lbw_minimal.clips.paths import SIDE_ON
+
+SURE = 0.5  # a cell with more shows an arm
+LEAST = 10  # cells in one piece: fewer are no arm
+MOST = 20  # of the largest piece in a shot; of an arm it had 32 or more, of a lamp 14
+PLAIN = 0.8  # so sure is at least one cell of an arm; of a person's body mostly none
+NEAR = 4  # cells from the edges over which an arm comes in
+# How far an arm reaches in, over how wide it is at the edge. A body that stands at the edge has
+# 0.4, a hand that is cut off by it 0.5.
+REACHES = 0.5
+APART = 4  # cells between two arms
+SEEN = 0.1  # of the frames: in those of clips without an arm there was none, else in 0.23 or more
+SEVERAL = 0.22  # of the frames: with two people it was 0.25 or more, with one 0.17 at most
+FAINT = 10  # grey levels: at the shoulder an arm moves by little
+COVERS = 0.04  # of the picture: a lamp that swings at its edge covers half of that, an arm twice
+ACROSS = 1.0  # of the width, from edge to edge: between them a lamp may hang beside an arm
+OFTEN = 0.05  # of the frames: an arm at its median place is not told from the room
+
+
+class Arms(NamedTuple):
+    """What arms come in over the left, the right and the upper edge of a shot."""
+
+    seen: float  # share of the frames in which the masks show one or more
+    several: float  # share of the frames in which they show two beside each other
+    enters: float  # where the largest comes in, 0 at the picture's left edge, 1 at its right; nan
+    moves: bool = False  # whether something as large as an arm moves over an edge
+    across: float = 0.0  # share of the frames in which large things are at both side edges
+
+    @property
+    def doubt(self) -> tuple[str, str] | None:
+        """Why the shot may show no arm, or several people, and what to film otherwise."""
+        if self.seen < SEEN and not self.moves:
+            return "no arm is seen, nothing large that moves comes in from the edge", SIDE_ON
+        if self.several >= SEVERAL or self.across >= OFTEN:
+            return (
+                "arms come in at two places, as of several people, or of one who fills the picture",
+                "film one arm, without the body, and let nothing else move near the edges",
+            )
+        return None
+
+
+def count(masks: np.ndarray, off: np.ndarray) -> Arms:
+    """The arms in masks (n, h, w), and in what is `off` the room, (T, 84, 84) grey levels."""
+    found = [_coming_in(mask) for mask in masks]
+    if max((arm[2] for one in found for arm in one), default=0) < MOST:
+        found = []
+    several = [any(b[0] - a[1] >= APART for a, b in pairwise(sorted(one))) for one in found]
+    places = [max(one, key=lambda arm: arm[2])[3] for one in found if one]
+    doors = _doors(off > MOVED)
+    if not places:  # at its median place an arm looks like the room
+        places = doors[np.isfinite(doors)].tolist()
+    return Arms(
+        seen=sum(map(bool, found)) / len(masks),
+        several=sum(several) / len(masks),
+        enters=float(np.median(places)) if places else np.nan,
+        moves=_comes_in(off > FAINT),
+        across=float((np.nan_to_num(np.ptp(doors, axis=1)) >= ACROSS).mean()),
+    )
+
+
+def _coming_in(mask):
+    """First and last column, cells, and place at the edge, 0 to 1, of each arm in a mask (h, w)."""
+    h, w = mask.shape
+    x, y = np.meshgrid(np.arange(w) + 0.5, np.arange(h) + 0.5)
+    inside = np.minimum(np.minimum(x, w - x), y)  # cells from the nearest edge
+    n, labels, stats, _ = cv2.connectedComponentsWithStats((mask > SURE).astype(np.uint8))
+    arms = []
+    for i in range(1, n):
+        left, _, width, _, cells = stats[i].tolist()
+        piece = labels == i
+        door = piece & (inside < NEAR)
+        if cells < LEAST or mask[piece].max() < PLAIN or not door.any():
+            continue
+        if inside[piece].max() >= REACHES * door.sum() / NEAR:
+            arms.append((left, left + width, cells, float(x[door].mean()) / w))
+    return arms
+
+
+def _comes_in(moves):
+    """Whether something that moves (T, 84, 84), as large as an arm, reaches over an edge of the
+    picture: what an arm moves may be larger, and need not be at the edge."""
+    _, stats = things(moves.sum(0) >= SOMETIMES)
+    return any(area >= COVERS * SMALL**2 and at_edge(*box) for *box, area in stats.tolist())
+
+
+def _doors(moves):
+    """The outermost places (T, 2) at which large things that move (T, 84, 84) come in over the
+    left, right and upper edge, 0 to 1 from left to right; nan where none does."""
+    out = np.full((len(moves), 2), np.nan)
+    for t, moved in enumerate(moves):
+        labels, stats = things(moved)
+        large = 1 + np.flatnonzero(stats[:, 4] >= LARGE * SMALL**2)
+        inside = np.isin(labels, large)
+        x = np.flatnonzero(inside[:EDGE].any(0)).tolist()
+        x += [0] * bool(inside[:, :EDGE].any()) + [SMALL - 1] * bool(inside[:, -EDGE:].any())
+        if x:
+            out[t] = min(x) / (SMALL - 1), max(x) / (SMALL - 1)
+    return out

@@ -1,0 +1,226 @@
+"""How many arms come into a clip, and where: by masks drawn by hand and by the detector's."""
+
+import numpy as np
+import pytest
+from toy_clips import arm, room
+
+from lbw_minimal.clips import arms
+from lbw_minimal.clips.detector import Detector
+from tasks.commands.prepare import EYES
+
+H, W = 32, 42  # cells
+
+
+def mask(*pieces):
+    """A mask in which rectangles (left, top, width, height, sureness) show an arm."""
+    out = np.zeros((H, W), np.float32)
+    for left, top, width, height, sure in pieces:
+        out[top : top + height, left : left + width] = sure
+    return out
+
+
+ARM = 20, 0, 4, 12, 0.9  # from above
+
+
+ROOM = np.zeros((5, 84, 84))  # in which nothing moves
+
+
+def count(*masks):
+    return arms.count(np.stack(masks), ROOM)
+
+
+def told(*pieces):
+    return count(*[mask(*pieces)] * 4)
+
+
+@pytest.mark.parametrize(
+    ("piece", "enters"),
+    [(ARM, 22 / W), ((0, 10, 12, 4, 0.9), 2 / W), ((30, 10, 12, 4, 0.9), 40 / W)],
+    ids=["from above", "from the left", "from the right"],
+)
+def test_an_arm_is_told_by_where_its_first_four_cells_are(piece, enters):
+    found = told(piece)
+    assert (found.seen, found.several, found.doubt) == (1, 0, None)
+    assert found.enters == pytest.approx(enters)
+
+
+@pytest.mark.parametrize(
+    ("piece", "seen"),
+    [
+        ((20, 0, 4, 5, 0.9), True), ((20, 0, 19, 1, 0.9), False),  # 20 cells; 19
+        ((20, 0, 4, 12, 0.81), True), ((20, 0, 4, 12, 0.79), False),  # sure somewhere
+        ((20, 3, 4, 12, 0.9), True), ((20, 4, 4, 12, 0.9), False),  # so far from the edge
+        ((20, 20, 4, 12, 0.9), False),  # over the lower edge
+        ((10, 0, 10, 6, 0.9), True), ((10, 0, 10, 5, 0.9), False),  # half as far in as wide
+        ((0, 8, 4, 16, 0.9), False),  # a body that stands at the left edge
+    ],
+)  # fmt: skip
+def test_an_arm_is_large_sure_and_reaches_in_over_an_edge(piece, seen):
+    assert told(piece).seen == seen
+
+
+def test_an_arm_may_be_seen_in_pieces_if_it_is_large_once():
+    small = mask((20, 0, 3, 4, 0.9))
+    assert count(*[small] * 4).seen == 0
+    assert count(small, small, small, mask(ARM)).seen == 1
+    assert count(mask((20, 0, 3, 3, 0.9)), mask(ARM)).seen == 0.5  # nine cells
+
+
+@pytest.mark.parametrize(("gap", "two"), [(4, 1), (3, 0)])
+def test_two_arms_are_four_cells_apart(gap, two):
+    assert told((4, 0, 4, 12, 0.9), (8 + gap, 0, 4, 12, 0.9)).several == two
+    assert told((8 + gap, 0, 4, 12, 0.9), (4, 0, 4, 12, 0.9), (2, 20, 6, 6, 0.9)).several == two
+
+
+def test_the_largest_of_two_arms_says_where_they_come_in():
+    assert told(ARM, (0, 10, 14, 4, 0.9)).enters == pytest.approx(2 / W)
+    assert told(ARM, (0, 10, 11, 4, 0.9)).enters == pytest.approx(22 / W)
+
+
+@pytest.mark.parametrize(
+    ("frames", "said"), [(9, "no arm is seen"), (10, ""), (100, "")], ids=["9", "10", "100"]
+)
+def test_an_arm_is_seen_in_a_tenth_of_the_frames(frames, said):
+    doubt = count(*[mask(ARM)] * frames, *[mask()] * (100 - frames)).doubt
+    assert doubt is None if not said else said in doubt[0] and doubt[1].startswith("film ")
+
+
+@pytest.mark.parametrize(("frames", "two"), [(21, False), (22, True)])
+def test_several_people_are_seen_in_two_frames_of_nine(frames, two):
+    both = mask(ARM, (0, 10, 12, 4, 0.9))
+    doubt = count(*[both] * frames, *[mask(ARM)] * (100 - frames)).doubt
+    assert doubt is None if not two else "several people" in doubt[0]
+
+
+def test_without_an_arm_there_is_no_place_where_it_comes_in():
+    found = told()
+    assert found[:2] == (0, 0) and np.isnan(found.enters) and "no arm" in found.doubt[0]
+
+
+# As what moves tells
+
+
+def moving(*boxes):
+    """A mask (84, 84) in which rectangles (x, y, width, height) move."""
+    mask = np.zeros((84, 84), bool)
+    for x, y, width, height in boxes:
+        mask[y : y + height, x : x + width] = True
+    return mask
+
+
+LEFT = (0, 30, 20, 12)
+
+
+@pytest.mark.parametrize(
+    ("boxes", "doors"),
+    [
+        ([LEFT], (0, 0)),
+        ([(64, 30, 20, 12)], (83, 83)),
+        ([(30, 0, 20, 30)], (30, 49)),  # from above
+        ([LEFT, (64, 30, 20, 12)], (0, 83)),
+        ([(0, 30, 84, 12)], (0, 83)),  # two whose hands meet
+        ([LEFT, (79, 10, 5, 20)], (0, 0)),  # 100 pixels, less than 0.015 of the picture
+        ([LEFT, (58, 30, 20, 12)], (0, 0)),  # an object in the picture
+        ([LEFT, (40, 72, 20, 12)], (0, 0)),  # over the lower edge: a table that is moved
+        ([(0, 30, 10, 10), (13, 30, 10, 10)], (0, 0)),  # an arm in pieces, 100 pixels each
+        ([(0, 30, 10, 10), (19, 30, 10, 10)], (np.nan, np.nan)),  # a gap of nine
+    ],
+)
+def test_a_door_is_where_something_large_comes_in(boxes, doors):
+    np.testing.assert_allclose(arms._doors(moving(*boxes)[None])[0], np.array(doors) / 83)
+
+
+@pytest.mark.parametrize(("often", "two"), [(2, False), (3, True)])
+def test_things_at_both_sides_in_a_twentieth_of_the_frames_are_two_people(often, two):
+    """Edge to edge, in so many of sixty frames; elsewhere the other one is a pixel off the edge."""
+    off = np.zeros((60, 84, 84))
+    off[:, 30:45, :20] = off[:often, 30:45, 64:] = 17
+    found = arms.count(np.zeros((4, H, W), np.float32), off)
+    assert found.across == often / 60 and ("several" in (found.doubt or [""])[0]) == two
+    off[:, 30:45, 64:] = 16  # grey levels: too few
+    assert arms.count(np.zeros((4, H, W), np.float32), off).across == 0
+
+
+def test_what_moves_says_where_an_arm_comes_in_that_the_masks_do_not_show():
+    off = np.zeros((4, 84, 84))
+    off[:, 30:42, 64:] = 17
+    found = arms.count(np.zeros((4, H, W), np.float32), off)
+    assert (found.seen, found.enters, found.moves) == (0, 1, False) and "no arm" in found.doubt[0]
+    off[:, 20:42, 64:] = 11  # faint, and large enough
+    found = arms.count(np.zeros((4, H, W), np.float32), off)
+    assert np.isnan(found.enters) and found.moves and found.doubt is None
+    assert arms.count(np.stack([mask(ARM)] * 4), off).enters == pytest.approx(22 / W)
+
+
+@pytest.mark.parametrize(
+    ("box", "frames", "arm"),
+    [
+        ((0, 20, 17, 17), 2, True),  # 289 pixels; 0.04 of the picture are 282
+        ((0, 20, 17, 16), 2, False),
+        ((0, 20, 17, 17), 1, False),  # noise moves a pixel once
+        ((4, 20, 17, 17), 2, True),  # a gap of four pixels to the edge is closed
+        ((5, 20, 17, 17), 2, False),
+        ((63, 20, 17, 17), 2, True),
+        ((62, 20, 17, 17), 2, False),
+        ((20, 4, 17, 17), 2, True),
+        ((20, 63, 17, 17), 2, True),
+    ],
+)
+def test_an_arm_is_a_twenty_fifth_of_the_picture_that_reaches_over_an_edge(box, frames, arm):
+    moves = np.stack([moving(box)] * frames + [moving()] * 5)
+    assert arms._comes_in(moves) == arm
+
+
+def test_an_arm_comes_in_beside_something_larger_that_does_not():
+    arm, toy, lamp = (0, 0, 17, 17), (40, 40, 20, 20), (0, 0, 16, 16)
+    assert arms._comes_in(np.stack([moving(arm, toy)] * 2))
+    assert not arms._comes_in(np.stack([moving(lamp, toy)] * 2))
+    assert not arms._comes_in(np.stack([moving()] * 2))
+
+
+# As the shipped detector sees them
+
+
+@pytest.fixture(scope="module")
+def shown():
+    detector = Detector.load(EYES)
+    return lambda frames: arms.count(detector.arms(frames), ROOM)
+
+
+FROM_LEFT = arm(np.clip(np.linspace(0, 0.6, 24), 0, 0.45))
+FROM_RIGHT = FROM_LEFT[:, :, ::-1]
+
+
+def test_the_detector_sees_an_arm_and_from_where(shown):
+    for film, enters in ((FROM_LEFT, 0.05), (FROM_RIGHT, 0.95)):
+        found = shown(film)
+        assert found.doubt is None and found.seen > 0.8
+        assert found.enters == pytest.approx(enters, abs=0.03)
+
+
+def test_the_detector_sees_two_people_and_one_of_them_may_rest(shown):
+    half = FROM_LEFT.shape[2] // 2
+    both = np.concatenate([FROM_LEFT[:, :, :half], FROM_RIGHT[:, :, half:]], 2)
+    assert "several people" in shown(both).doubt[0]
+
+
+def test_what_moves_alone_is_no_arm_to_the_detector(shown):
+    toy, lamp = (np.repeat(room()[None], 24, 0) for _ in range(2))
+    for i in range(24):
+        toy[i, 40:56, 40 + i : 60 + i] = (200, 40, 30)
+        x = round(70 + 8 * np.sin(i / 3))
+        lamp[i, :9, x : x + 9] = (250, 240, 90)  # hangs in from the upper edge, and swings
+    for film in (toy, lamp, np.repeat(room()[None], 24, 0)):
+        assert "no arm" in shown(film).doubt[0]
+
+
+def test_masks_are_those_of_the_picture_without_the_black_bars_around_it():
+    detector = Detector.load(EYES)
+    wide = detector.arms(np.repeat(FROM_LEFT, 3, 0))
+    assert wide.shape == (
+        60,
+        *(round(42 * side / max(FROM_LEFT.shape[1:3])) for side in FROM_LEFT.shape[1:3]),
+    )
+    upright = detector.arms(np.rot90(FROM_LEFT, axes=(1, 2)).copy())
+    assert upright.shape == (24, *wide.shape[:0:-1])
+    assert wide.min() >= 0 and 0.9 < wide.max() <= 1
