@@ -19,7 +19,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
-CODE = ("lbw_minimal", "notebooks", "tasks", "tests")  # of the kit, with the videos: 7 MB
+CODE = ("lbw_minimal", "notebooks", "tasks", "tests")  # of the kit, with the videos: 8 MB
 KIT = (*CODE, "solutions")  # with the weights: 30 MB
 LEAN = Path(__file__).with_name("lean")  # for the path of Ray's processes: see what lies there
 INTERRUPTED = 130  # exit code: 128 and the signal's number
