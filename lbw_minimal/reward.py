@@ -60,11 +60,12 @@ class MendedReward:
     The mends: `trim` cuts pauses, which make idling look like the skill. `speed` slows the
     demonstration down to the robot's pace, and hurries it if it would take more than 80 % of the
     horizon. `include_goal` lets p reach N. `timed` compares with frame t + 1 and step t instead of
-    the nearest ones, so that falling behind costs. Three changes have no switch. r1 judges z_{t+1},
+    the nearest ones, so that falling behind costs. Four changes have no switch. r1 judges z_{t+1},
     which a_t can still change, where Eq. 9 judges z_t. The distance is the mean over keypoints,
     each capped at twice the mean path, so that a lost keypoint costs a bounded share. It is divided
     by the mean path: r1 = -1 is an arm that never moved, seen at the end, if the demonstration ends
-    farthest from its start. The reward lies in [-2 sum(lam), 0].
+    farthest from its start. A median over three frames takes single glitches out of the
+    demonstration. The reward lies in [-2 sum(lam), 0].
 
     Raises InputError if shapes do not fit or nothing moves in the demonstration.
     """
