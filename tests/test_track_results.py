@@ -69,3 +69,19 @@ def test_forms_of_the_tracks_reward_are_as_good_as_their_table_says():
     ):
         assert f"| {name} | {' | '.join(row)} |" in readme
     assert won(tracks / "own-push") == "100/100"
+
+
+@pytest.mark.parametrize("task", ["push", "slide", "coffee", "drawer"])
+def test_runs_took_the_time_that_their_table_says(task):
+    """Mean seconds on the server, where coffee's and drawer's tracks are of the form before."""
+    now = RESULTS / "paper" / "runs"
+    tracks = (RESULTS / "tracks" / "half", "") if task in ("coffee", "drawer") else (now, "-tracks")
+    cells = []
+    for folder, end in (tracks, (now, "")):
+        runs = [read(folder / f"{task}-{seed}{end}" / "metrics.json") for seed in range(3)]
+        policy = sum(run["stages"].pop("policy") for run in runs) / 3
+        rest = sum(sum(run["stages"].values()) for run in runs) / 3
+        steps = f"{runs[0]['settings']['recipe']['policy_steps']:,}"
+        cells += [f"{rest:.0f}", f"{policy:.0f}" + f" ({steps})" * (task == "slide")]
+    row = f"| {task} | {' | '.join(cells)} |".replace("(10,000)", "(10,000 steps)")
+    assert row in (RESULTS / "README.md").read_text()
