@@ -37,8 +37,9 @@ def steps_of(rows):
 @pytest.mark.parametrize("task", ["push", "slide", "coffee", "drawer"])
 def test_object_tracks_are_as_good_as_their_tables_say(task):
     readme = (RESULTS / "README.md").read_text()
+    lesson = (RESULTS.parents[1] / "notebooks" / "13_after_the_paper.ipynb").read_text()
     for row in tracks_rows(task):
-        assert f"| {' | '.join(row)} |" in readme
+        assert f"| {' | '.join(row)} |" in readme and f"| {' | '.join(row)} |" in lesson
     moved = read(RESULTS / "tracks" / "jitter.json")[task]
     runs = [batch.read(RESULTS / "paper" / "runs", task, seed, "tracks") for seed in range(3)]
     assert moved["0.005"] == [run["wins"] for run in runs]
