@@ -50,8 +50,7 @@ class KeypointRewardWrapper(gym.Wrapper, RecordConstructorArgs):
 
     The clock alone would do in theory, but then the agent would have to learn the demonstration by
     heart. How things move decides a hit. The step before the last tells where the tip is being
-    pulled: its goal runs ahead of it, unseen in the frames. What each is worth:
-    solutions/results/README.md.
+    pulled: its goal runs ahead of it, unseen in the frames.
     """
 
     def __init__(self, env: gym.Env, reward: KeypointReward):
