@@ -19,7 +19,7 @@ MODULES = {
     "lbw_minimal.clips": (
         *("detector", "detector_networks", "drawings", "drawn_shapes", "patches", "corners"),
         *("reader", "decoding", "hdr", "upright", "footage", "stills", "lookalike", "camera"),
-        *("motion", "outline", "hiding", "paths", "pushing", "retarget", "shots", "arms"),
+        *("motion", "outline", "hiding", "paths", "pushing", "retarget", "screen", "shots", "arms"),
     ),
     "tasks": tuple(tasks.TASKS),
     "tasks.world": ("arm", "bodies", "env", "motion", "reenact", "scene"),

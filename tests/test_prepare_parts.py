@@ -21,7 +21,8 @@ ONE, NONE = Arms(1.0, 0.0, 0.5), Arms(0.0, 0.0, np.nan)  # arms that come in
 
 
 def clip(n=6, height=90, width=160, start=0.0):
-    return Clip(np.zeros((n, height, width, 3), np.uint8), start + np.arange(n) / 20, [], [])
+    frames = (np.arange(n * height * width * 3) % 251).astype(np.uint8)  # as many colours as a room
+    return Clip(frames.reshape(n, height, width, 3), start + np.arange(n) / 20, [], [])
 
 
 def prepared(**more):

@@ -20,7 +20,7 @@ import numpy as np
 
 import tasks
 from lbw_minimal import imitate, video
-from lbw_minimal.clips import arms, footage
+from lbw_minimal.clips import arms, footage, screen
 from lbw_minimal.clips.detector import Detector, Found, refine
 from lbw_minimal.clips.hiding import unlike
 from lbw_minimal.clips.motion import small, told
@@ -61,9 +61,7 @@ class Prepared:
     tracks: Tracks | None = None
     motion: Motion | None = None
     done: Reenactment | None = None
-    film: np.ndarray = field(
-        default_factory=no_frames
-    )  # (N, 84, 84, 3) uint8, as `--video` reads it
+    film: np.ndarray = field(default_factory=no_frames)  # (N, 84, 84, 3), as `--video` reads it
     file: bytes = b""  # the same film as an mp4
     why_not: str = ""  # if the clip is not usable
     notes: list[str] = field(default_factory=list)
@@ -136,8 +134,11 @@ def prepare(name: str, path: Path, choices: Choices | None = None) -> Prepared:
             result.motion = follow(result, choices)
             result.done = reenact(env, result.motion)
         except Unusable as error:
-            result.why_not = str(error)
-            if not result.motion and result.tracks and (said := jumps(result.tracks)):
+            on_a_screen = None if choices.placed else screen.recorded(clip.frames)
+            result.why_not = str(on_a_screen or error)
+            if on_a_screen:
+                result.warnings = [*clip.losses]  # no camera trembles there
+            elif not result.motion and result.tracks and (said := jumps(result.tracks)):
                 result.warnings.append(f"{said}: only one piece of it counts.")
     finally:
         env.close()
@@ -234,10 +235,8 @@ def look(frames: np.ndarray, cuts: Sequence[int], touched: bool) -> Found:
     """
     model = Detector.load(EYES)
     shots = [looked(model, frames[a:b], touched) for a, b in pairwise([0, *cuts, len(frames)])]
-    found = Found(
-        *(np.concatenate([getattr(one, name) for one in shots]) for name in vars(shots[0]))
-    )
-    return refine(frames, found, cuts)
+    joined = (np.concatenate([getattr(one, name) for one in shots]) for name in vars(shots[0]))
+    return refine(frames, Found(*joined), cuts)
 
 
 def looked(model: Detector, frames: np.ndarray, touched: bool) -> Found:
