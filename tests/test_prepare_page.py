@@ -181,6 +181,27 @@ def test_the_page_can_be_read(seen, how):
     assert seen[how] == FINE
 
 
+@pytest.mark.parametrize(
+    ("yours", "asked"),
+    [
+        ((), "on the tip, or not on the object?"),
+        (("tip",), "on the object?"),
+        (("object",), "on the tip?"),
+        (("tip", "object"), None),
+    ],
+)
+def test_a_page_asks_only_for_dots_that_are_not_the_users(yours, asked, tmp_path):
+    frames, times, tracks = clip()
+    for name in yours:
+        tracks = tracks.marked(name, [(50.0, 60.0, 0.0), (50.0, 60.0, 1.1)])
+    write_page(
+        tmp_path / "page.html", task="push", command="", verdict="not usable: it rains.",
+        frames=frames, times=times, scene=SimpleNamespace(), notes=[], warnings=[], tracks=tracks,
+    )  # fmt: skip
+    text = (tmp_path / "page.html").read_text()
+    assert ("Is a dot below not" in text) == bool(asked) and (asked or "") in text
+
+
 def test_pictures_outside_of_what_is_used_are_grey_and_say_so():
     frames = clip_frames(*clip(), (0.3, 0.82)).split("<figure")[1:]
     grey = ["class=unused" in frame for frame in frames]

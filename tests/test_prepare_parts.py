@@ -88,17 +88,26 @@ def test_a_usable_clip_is_told_with_its_warnings_and_how_to_learn_from_it(
     assert asked[-1] == ("push", result, note, "")
 
 
+@pytest.mark.parametrize(
+    ("yours", "said"),
+    [
+        ((), True), ((("tip", 0.0, 0.25), ("object", 0.0, 0.2)), True),
+        ((("tip", 0.0, 0.25), ("object", 0.0, 0.25)), False),  # all of them
+    ],
+)  # fmt: skip
 def test_a_clip_refused_for_what_was_found_in_it_can_be_corrected_by_a_click(
-    tmp_path, monkeypatch, capsys
+    yours, said, tmp_path, monkeypatch, capsys
 ):
-    result = prepared(why_not="the object never moves.", tracks="found")
+    way, none = np.zeros((6, 2)), np.zeros(6)
+    tracks = Tracks(clip().times, way, way, none, none, 90, yours=yours)
+    result = prepared(why_not="the object never moves.", tracks=tracks)
     monkeypatch.setattr(prepare, "prepare", lambda *what: result)
     monkeypatch.setattr(prepare, "write", lambda out, *what: out / "page")
     (tmp_path / "a.mp4").touch()
     assert prepare.main(["push", str(tmp_path / "a.mp4"), "--out", str(tmp_path)]) == 2
     assert capsys.readouterr().out.splitlines() == [
         "not usable: the object never moves.", f"page: {tmp_path / 'page'}",
-        "or else: if a dot on the page is wrong, click there where it should be",
+        *["or else: if a dot on the page is wrong, click there where it should be"] * said,
     ]  # fmt: skip
 
 

@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 
 from lbw_minimal.clips.paths import SURE, Tracks
 from lbw_minimal.clips.retarget import FPS, Motion, Scene
-from lbw_minimal.clips.shots import STRIP, drawn, to_correct
+from lbw_minimal.clips.shots import STRIP, correctable, drawn, to_correct
 from lbw_minimal.films import Film
 from lbw_minimal.pictures import (
     COLOURS,
@@ -42,8 +42,8 @@ OPTIONS = [
     ("--object X,Y@S", "and the object at these"),
 ]
 UNLESS = """
-<p>It may have been seen wrongly. Is a dot below not on the tip, or not on the object? Click where
-it should be: the clip may be usable after all.</p>
+<p>It may have been seen wrongly. Is a dot below not on the {}? Click where it should be: the clip
+may be usable after all.</p>
 """
 FIRST = """
 <p id="first" class="note" hidden>Run the corrected command above first: this one learns the motion
@@ -90,7 +90,8 @@ def write_page(
     head, _, rest = verdict.partition(": ")
     why = escape(rest[:1].upper() + rest[1:])
     page = [f"<h1>{escape(task).capitalize()}: {escape(head)}</h1>", f"<p>{why}</p>"]
-    page += [UNLESS] if tracks is not None and head == "not usable" else []
+    if tracks is not None and head == "not usable" and (names := correctable(tracks)):
+        page.append(UNLESS.format(", or not on the ".join(names)))
     page += [f'<p class="note">{escape(warning)}</p>' for warning in warnings]
     if columns and shown is not None:
         seen = clip_column(frames, times, tracks, motion, shown)

@@ -178,6 +178,13 @@ def _how_sure(tracks, name, i):
     return f"{getattr(tracks, f'{name}_sure')[i]:.0%} sure"
 
 
+def correctable(tracks: Tracks) -> list[str]:
+    """Which of "tip" and "object" has dots that are not the user's, and so may be wrong."""
+    every = range(len(tracks.times))
+    names = "tip", "object"
+    return [name for name in names if not all(tracks.is_yours(name, i) for i in every)]
+
+
 def drawn(frame: np.ndarray, tracks: Tracks | None = None, i: int = 0) -> np.ndarray:
     """A frame at most WIDE pixels wide or high, with what was found at index i of the tracks."""
     scale = WIDE / max(frame.shape[:2])

@@ -30,6 +30,7 @@ from lbw_minimal.clips.patches import gone, mended
 from lbw_minimal.clips.paths import Tracks, Unusable, jumps
 from lbw_minimal.clips.reader import Clip, read_clip
 from lbw_minimal.clips.retarget import FPS, Motion, Scene, lay
+from lbw_minimal.clips.shots import correctable
 from lbw_minimal.clips.stills import write_stills
 from lbw_minimal.pictures import spread
 from lbw_minimal.report import COLUMNS
@@ -107,7 +108,7 @@ def main(argv: list[str]) -> int:
     for warning in result.warnings:
         print(f"warning: {warning}")
     if result.why_not:
-        if result.tracks is not None:
+        if result.tracks is not None and correctable(result.tracks):
             print("or else: if a dot on the page is wrong, click there where it should be")
         return 2
     print(f"learn: {learn}")
