@@ -25,6 +25,7 @@ from lbw_minimal.training import (
     load_weights,
     pick_device,
     progress,
+    quantity,
     save_state,
     seed_everything,
 )
@@ -63,7 +64,7 @@ def _check(frames, name, least):
             f"{name} is {frames.shape} {frames.dtype}; give frames, (T, 84, 84, 3) uint8."
         )
     if len(frames) < least:
-        raise InputError(f"{name} has {len(frames)} frames; give at least {least}.")
+        raise InputError(f"{name} has {quantity(len(frames), 'frame')}; give at least {least}.")
 
 
 def small_images(frames: np.ndarray, device: torch.device | str = "cpu") -> torch.Tensor:

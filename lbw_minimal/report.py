@@ -48,7 +48,7 @@ from lbw_minimal.report_texts import (
     SMOKE,
     VIDEOS,
 )
-from lbw_minimal.training import write_atomic
+from lbw_minimal.training import quantity, write_atomic
 
 LEARNS = {  # the stages in which something is learnt; the others film
     "lbw": ("translation", "keypoints", "policy"),
@@ -204,7 +204,8 @@ def headline(task: str, metrics: dict[str, Any], method: str = "lbw", goal: str 
     title, tiles = f"{name}: a robot learns from {VIDEOS[method]}", []
     if result:
         n = result["episodes"]
-        title = f"{name}: {round(result['rate'] * n)} of {n} test episodes succeed"
+        won, of = round(result["rate"] * n), quantity(n, "test episode")
+        title = f"{name}: {won} of {of} {'succeeds' if n == 1 else 'succeed'}"
         low, rate, high = (round(100 * result[key]) for key in ("low", "rate", "high"))
         tiles = [(f"{rate} %", "success rate"), (f"{low}-{high} %", "95 % confidence interval")]
     notes = [SMOKE] if settings.get("fast") else []

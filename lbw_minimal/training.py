@@ -28,6 +28,11 @@ class InputError(ValueError):
     """A mistake in what the user gave: one sentence that names the thing and the remedy."""
 
 
+def quantity(n: int, noun: str) -> str:
+    """So many things in words: "1 frame", "2 frames"."""
+    return f"{n} {noun}" if n == 1 else f"{n} {noun}s"
+
+
 def pick_device(name: str = "cpu") -> torch.device:
     """Torch device of that name. Raises InputError if the machine has no such device."""
     if name.startswith("cuda") and not torch.cuda.is_available():

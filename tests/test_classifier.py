@@ -257,7 +257,7 @@ def test_resumed_training_ends_exactly_like_an_unbroken_one(tmp_path):
         ([], "no videos"),
         ([numbered(9), numbered(9)[:, :64]], r"video 1 is \(9, 64, 84, 3\) uint8"),
         ([numbered(9) / 255.0], "video 0 is .* float64"),
-        ([numbered(1)], "video 0 has 1 frames; give at least 2"),
+        ([numbered(1)], "video 0 has 1 frame; give at least 2"),
     ],
 )
 def test_videos_without_goal_or_rest_are_refused_in_one_sentence(videos, why):

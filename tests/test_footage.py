@@ -66,7 +66,13 @@ def few_frames(room):
     return arms(room, "left")[10:15], "5 frames in one go are too few"
 
 
-@pytest.mark.parametrize("fault", [panned, hand_held, few_frames], ids=lambda f: f.__name__)
+def one_frame(room):
+    return arms(room, "left")[10:11], "1 frame in one go is too few"
+
+
+@pytest.mark.parametrize(
+    "fault", [panned, hand_held, few_frames, one_frame], ids=lambda f: f.__name__
+)
 def test_other_footage_is_refused_with_the_reason(room, fault):
     frames, reason = fault(room)
     with pytest.raises(Unusable, match=reason):

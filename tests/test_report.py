@@ -310,6 +310,14 @@ def test_what_was_trained_before_is_told_from_what_was_learnt(tmp_path, run, met
     assert 'class="note"' not in page  # which is for warnings
 
 
+@pytest.mark.parametrize(
+    ("n", "said"), [(1, "1 of 1 test episode succeeds"), (2, "2 of 2 test episodes succeed")]
+)
+def test_the_headline_counts_episodes_as_people_do(tmp_path, run, n, said):
+    success = {"rate": 1.0, "low": 0.2, "high": 1.0, "episodes": n}
+    assert f"<h1>Push: {said}</h1>" in written(tmp_path, run | {"metrics": {"success": success}})
+
+
 def test_what_success_is_stands_below_the_figures(tmp_path, run):
     page = written(tmp_path, run | {"goal": "the cube gets < 5 cm near"})
     said = "<p>An episode is a success if the cube gets &lt; 5 cm near."

@@ -14,6 +14,7 @@ from lbw_minimal.training import (
     InputError,
     load_state,
     pick_device,
+    quantity,
     save_state,
     seed_everything,
 )
@@ -24,6 +25,10 @@ ROOT = Path(__file__).resolve().parent.parent
 def round_trip(path, state):
     save_state(path / "state", state)
     return load_state(path / "state")
+
+
+def test_one_thing_is_no_plural():
+    assert [quantity(n, "frame") for n in range(3)] == ["0 frames", "1 frame", "2 frames"]
 
 
 def test_nested_state_comes_back(tmp_path):

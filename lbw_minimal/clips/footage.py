@@ -18,6 +18,7 @@ import numpy as np
 from lbw_minimal.clips import camera
 from lbw_minimal.clips.motion import MOVED, MOVED_SHARE, SMALL, before_background
 from lbw_minimal.clips.paths import LEAST_FRAMES, SIDE_ON, Unusable
+from lbw_minimal.training import quantity
 
 # Of the longer side: the way of the picture's corners. Below the first a camera stands, above the
 # second near and far things move apart, and no fit undoes it.
@@ -52,7 +53,8 @@ def check(frames: np.ndarray, cuts: Sequence[int] = ()) -> Footage:
     first, last = max(shots, key=lambda shot: shot[1] - shot[0])
     if last - first < LEAST_FRAMES:
         raise Unusable(
-            f"{last - first} frames in one go are too few, at least {LEAST_FRAMES} are needed",
+            f"{quantity(last - first, 'frame')} in one go {'is' if last - first == 1 else 'are'} "
+            f"too few, at least {LEAST_FRAMES} are needed",
             "film the whole motion in one go, at 10 frames a second or more",
         )
     shot = slice(first, last)

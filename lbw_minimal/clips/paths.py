@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from lbw_minimal.training import InputError
+from lbw_minimal.training import InputError, quantity
 
 SMOOTH = 0.05  # s, sigma of the low-pass; a webcam's frames are 0.1 s apart, a phone's 0.03
 REST = 0.3  # s that are kept of a rest before the hand starts and after the object has arrived
@@ -309,8 +309,7 @@ def ends(path: np.ndarray, least: float, what: str) -> tuple[np.ndarray, np.ndar
 
 def never_moves(what: str, gone: float) -> Unusable:
     """The error for a hand or object, `what`, that has gone too few pixels."""
-    pixels = "1 pixel" if round(gone) == 1 else f"{gone:.0f} pixels"
-    return Unusable(f"the {what} never moves, or by {pixels} only", NEARER)
+    return Unusable(f"the {what} never moves, or by {quantity(round(gone), 'pixel')} only", NEARER)
 
 
 def progress(path: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from lbw_minimal.clips.reader import Clip
-from lbw_minimal.training import InputError
+from lbw_minimal.training import InputError, quantity
 from tasks.commands import Parser, within
 
 SLACK = 0.01  # s: the page rounds times to 0.001
@@ -45,7 +45,7 @@ class Choices:
     def placed(self) -> str:
         """A sentence on what the user placed; "" if that is nothing."""
         counts = [("tip", len(self.tip)), ("object", len(self.object))]
-        said = [f"the {name} in {n} picture{'s'[: n - 1]}" for name, n in counts if n]
+        said = [f"the {name} in {quantity(n, 'picture')}" for name, n in counts if n]
         return f"You placed {' and '.join(said)}." if said else ""
 
     def check(self, clip: Clip) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 
 import tasks
 from lbw_minimal.report import wilson
-from lbw_minimal.training import write_atomic
+from lbw_minimal.training import quantity, write_atomic
 from tasks.commands import Parser, at_least
 from tasks.commands.batch import Job, Row, print_missing, read, run_missing
 from tasks.commands.job import TEST_EPISODES
@@ -187,7 +187,7 @@ def table_two(runs: dict[tuple[str, str], list[Row]]) -> str:
         done = [r for (_, c), some in runs.items() if c == change for r in some]
         if done:
             cells = [cell(change, task) for task in tasks.TASKS]
-            rows.append([name, videos, *cells, f"{hours(done)} in {len(done)} runs"])
+            rows.append([name, videos, *cells, f"{hours(done)} in {quantity(len(done), 'run')}"])
     return markdown(["method", "expert videos", *tasks.TASKS, "time"], rows)
 
 

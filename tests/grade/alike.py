@@ -17,6 +17,7 @@ from dataclasses import dataclass, field
 from html import escape
 from itertools import combinations
 
+from lbw_minimal.training import quantity
 from tests.grade.exercise import Exercise, everything
 from tests.grade.files import printable
 from tests.grade.sheets import sheet
@@ -175,7 +176,7 @@ def alike_page(class_: Class, wrong: list[set[str]]) -> str:
     n = len(class_.names)
     head = "<h1>Alike answers</h1>" + EXPLAINED.format(common=COMMON, k="k")
     if n < FEW:
-        head += f"<p>Of {n} submissions nothing can be said about chance.</p>"
+        head += f"<p>Of {quantity(n, 'submission')} nothing can be said about chance.</p>"
     middle, high = quantile(class_, 0.5), quantile(class_, 0.99)
     head += (
         f"<p>Half of the {n * (n - 1) // 2} pairs of this class share {middle:.0f} bits or less, "
@@ -225,7 +226,7 @@ def _beside(class_: Class, i: int, pair: Pair, wrong: list[set[str]]) -> str:
 def _exercise(class_: Class, id: str) -> str:
     """The pairs that share most in one exercise."""
     best = heapq.nlargest(EACH, class_.pairs, key=lambda p: p.bits.get(id, 0.0))
-    rows = [f"<li>{_names(class_, p)}: {p.bits[id]:.0f} bits</li>"
+    rows = [f"<li>{_names(class_, p)}: {quantity(round(p.bits[id]), 'bit')}</li>"
             for p in best if p.bits.get(id, 0.0) >= 1]  # fmt: skip
     n, chance = len(class_.trees[id]), class_.chance[id]
     said = f"{id} {escape(everything()[id].title)}"

@@ -14,6 +14,7 @@ from html import escape
 
 import numpy as np
 
+from lbw_minimal.training import quantity
 from tests.grade.exercise import everything
 from tests.grade.sheets import sheet
 from tests.grade.webpage import table, webpage, words
@@ -142,7 +143,7 @@ def items_page(items: list[Item], left_out: int) -> str:
     """The statistics as a page. left_out: submissions in which nothing was tried, or that could
     not be graded."""
     n = items[0].answers if items else 0
-    parts = ["<h1>Item statistics</h1>", f"<p>{n} submissions", "</p>", EXPLAINED]
+    parts = ["<h1>Item statistics</h1>", f"<p>{quantity(n, 'submission')}", "</p>", EXPLAINED]
     if left_out:
         parts[1] += f"; {left_out} more, in which no exercise was tried, are left out"
     rows = [[f'<a href="#e{i.id}">{i.id}</a> {escape(i.title)}', _share(i), str(i.open), _rest(i)]
