@@ -9,11 +9,16 @@ from pathlib import Path
 from typing import Any
 
 from lbw_minimal.clips.reader import Clip
+from lbw_minimal.clips.upright import SIDE
 from lbw_minimal.training import InputError, quantity
 from tasks.commands import Parser, within
 
 SLACK = 0.01  # s: the page rounds times to 0.001
-WHERE = "as a click into the page writes it; may be given several times"
+WHERE = (
+    "X and Y pixels from the left and the upper edge of the picture as it was read, at most "
+    f"{SIDE} wide or high, S seconds into the clip; a click into the page writes it, and it may be "
+    "given several times"
+)
 
 Mark = tuple[float, float, float]  # x, y in pixels of the clip as it was read, s
 
@@ -73,13 +78,23 @@ def parser() -> Parser:
         dest="first",
         default=0.0,
         metavar="S",
-        help="leave out what is before",
+        help="second of the clip from which on it is used",
     )
-    add("--to", type=seconds, dest="last", metavar="S", help="and after")
-    add("--mirror", action=argparse.BooleanOptionalAction, help="left for right (as it goes)")
+    add(
+        "--to",
+        type=seconds,
+        dest="last",
+        metavar="S",
+        help="second up to which it is used (its end)",
+    )
+    add(
+        "--mirror",
+        action=argparse.BooleanOptionalAction,
+        help="turn left into right, or do not (as it goes)",
+    )
     marks: Any = {"type": mark, "action": "append", "default": [], "metavar": "X,Y@S"}
     add("--tip", **marks, help=f"where the tip is: {WHERE}")
-    add("--object", **marks, help=f"and the object: {WHERE}")
+    add("--object", **marks, help="where the object is, written likewise")
     add(
         "--out",
         type=Path,
