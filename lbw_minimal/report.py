@@ -44,9 +44,11 @@ from lbw_minimal.report_texts import (
     REPLAY,
     REWARD,
     SCENE,
+    SET,
     SHOWN,
     SMOKE,
     VIDEOS,
+    WORDS,
 )
 from lbw_minimal.training import quantity, write_atomic
 
@@ -269,14 +271,17 @@ def figures(metrics: dict[str, Any]) -> list[str]:
         names = dict.fromkeys(name for column in scores.values() for name in column)
         rows = [(name, *(score(column.get(name)) for column in scores.values())) for name in names]
         rest = {name: value for name, value in perception.items() if name not in scores}
-        tables = table([("", *scores), *rows]), table(flat(rest))
+        tables = table([("", *scores), *rows]), table(in_words(rest))
         page += section("Perception, measured", PERCEPTION, *tables)
     given = dict(metrics.get("settings", {}))
-    if stages and "policy" not in stages:  # a replay follows no recipe
-        given.pop("recipe", None)
-    settings = flat(given)
-    settings += flat({k: v for k, v in metrics.items() if k in MACHINE})
-    return page + (section("Settings", table(settings)) if settings else [])
+    recipe = given.pop("recipe", {})
+    if stages and "policy" not in stages:
+        recipe = {}  # a replay follows none
+    settings = in_words(given)
+    settings += [(*row, name) for name, value in recipe.items() for row in in_words({name: value})]
+    settings += in_words({k: v for k, v in metrics.items() if k in MACHINE})
+    about = SET if recipe else ""
+    return page + (section("Settings", about, table(settings)) if settings else [])
 
 
 def is_scores(column: object) -> bool:
@@ -290,12 +295,24 @@ def score(value: dict | None) -> str:
     return f"{value['r2']:.3f} ({value['px']:.1f})" if value and value["r2"] is not None else "-"
 
 
+def in_words(tree: dict[str, Any]) -> list[tuple[str, ...]]:
+    """The rows of `flat` with names for people, without what is not set."""
+    return [(WORDS.get(name, name), value) for name, value in flat(tree) if value]
+
+
 def flat(tree: Any, name: str = "") -> list[tuple[str, str]]:
     """Nested figures as rows of name and value."""
     if isinstance(tree, dict):
         return [row for key, value in tree.items() for row in flat(value, f"{name} {key}".strip())]
     values = tree if isinstance(tree, list) else [tree]
-    return [(name, ", ".join(f"{v:.3g}" if isinstance(v, float) else str(v) for v in values))]
+    return [(name, ", ".join(map(_value, values)))]
+
+
+def _value(value):
+    """A figure in words; nothing for what is not set."""
+    if value is None or isinstance(value, bool):
+        return "" if value is None else "yes" if value else "no"
+    return f"{value:.3g}" if isinstance(value, float) else str(value)
 
 
 def duration(seconds: float) -> str:

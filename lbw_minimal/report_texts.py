@@ -132,7 +132,8 @@ SHOWN = {
 CLIP = {
     "lbw": """
 <p>This is your clip. A simulated human did its motion again in the task's scene; that film was
-translated, and the robot imitates it. So it learns your motion, not your object. <a
+translated, and the robot imitates it. So it learns your motion, not your object. It practises up to
+twice as long as with the kit's own video, because your way and your pauses are others. <a
 href="prepare.html">What was found in the clip</a></p>
 """,
     "tracks": """
@@ -223,7 +224,7 @@ back to it, until the end.</p>
 """,
     "rival": """
 <p>The goal classifier's logit of the robot's picture at each step of the test episode. The reward
-is that, divided by the recipe's clip.</p>
+is that, divided by the logit that earns a reward of 1, which the settings below name.</p>
 """,
     "tracks": """
 <p>The three parts of what the robot earned at each step of the test episode: r1 for an object that
@@ -245,3 +246,36 @@ SMOKE = "This was a smoke run: no stage ran long enough to learn. Its figures sa
 GOAL = "An episode is a success if {}."
 LEARNT = "Learnt in this run: {}. The rest was trained before."
 REPLAY = "A replay: nothing was learnt in this run. What it shows was trained before."
+SET = '<p class="small">The names on the right are those that --set NAME=VALUE takes.</p>'
+
+# What the names in metrics.json mean.
+WORDS = {
+    "from_scratch": "perception trained in this run",
+    "jitter": "starts are moved by up to (m)",
+    "video": "fingerprint of the video",
+    "set": "changed by --set",
+    "fast": "smoke run",
+    "without": "mend of the reward that is left out",
+    "version": "version of the kit",
+    "memory_mb": "memory (MB)",
+    "human_frames": "frames of the human that perception learns from",
+    "robot_frames": "frames of the robot that it learns from",
+    "munit_iterations": "steps of the translation's training",
+    "munit_width": "channels of the translation's first layer",
+    "transporter_iterations": "steps of the keypoints' training",
+    "K": "keypoints",
+    "shift": "pixels by which the keypoints' training moves frames",
+    "hue": "degrees by which it turns hues",
+    "policy_steps": "steps that the robot practises",
+    "updates": "updates of the policy at each of them",
+    "entropy": "chance in its actions at first (entropy of each number)",
+    "motion": "what moves counts more in the translation",
+    "classifier_iterations": "steps of the goal classifier's training",
+    "random_negatives": "random motion is shown to it as no goal",
+    "clip": "its logit that earns a reward of 1",
+    "pixel_updates": "updates of the policy at each step",
+    "hold": "steps for which a random action is kept at first",
+    "contact_px demonstration": "from tip to object while it moves, in the video (pixels)",
+    "contact_px robot": "the same of the robot's expert",
+    "keypoint_std": "how far each coordinate of a keypoint moves (standard deviation)",
+}

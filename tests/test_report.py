@@ -3,6 +3,7 @@
 import base64
 import io
 import re
+from dataclasses import fields
 from html.parser import HTMLParser
 
 import numpy as np
@@ -10,6 +11,8 @@ import pytest
 from PIL import Image
 
 from lbw_minimal import pictures, report
+from lbw_minimal.imitate import Recipe
+from lbw_minimal.report_texts import WORDS
 
 T, N, K = 4, 9, 3
 SCENE = (
@@ -195,7 +198,7 @@ def test_the_page_has_every_section(page):
     )  # method, columns, film, paths, curve, reward
     assert page.count("<video") == 1
     for text in ("9 of 10", "60-98 %", "11.0 min", "0.987 (0.4)", "python -m tasks push --seed 7",
-                 "two cores", "keypoint std", "0.25, 0.11", "recipe K", "✓ ✓ ✓ ✗ ✓"):  # fmt: skip
+                 "two cores", "(standard deviation)", "0.25, 0.11", "✓ ✓ ✓ ✗ ✓"):  # fmt: skip
         assert text in page
 
 
@@ -281,6 +284,23 @@ def test_a_page_of_real_size_stays_small(tmp_path):
 def test_a_smoke_run_says_so(tmp_path, page, run):
     assert "smoke run" not in page
     assert "smoke run" in written(tmp_path, run | {"metrics": {"settings": {"fast": True}}})
+
+
+def test_settings_are_named_for_people_and_what_is_not_set_is_left_out():
+    """A number keeps its value: 1 is no yes."""
+    settings = {"task": "push", "without": None, "set": [], "fast": False, "from_scratch": True,
+                "seed": 1, "recipe": {"K": 5, "updates": 1, "random_negatives": False}}  # fmt: skip
+    rows = re.findall("<tr>(.*?)</tr>", "".join(report.figures({"settings": settings})))
+    assert [re.findall("<td>(.*?)</td>", row) for row in rows] == [
+        ["task", "push"], ["smoke run", "no"], ["perception trained in this run", "yes"],
+        ["seed", "1"], ["keypoints", "5", "K"],
+        ["updates of the policy at each of them", "1", "updates"],
+        ["random motion is shown to it as no goal", "no", "random_negatives"],
+    ]  # fmt: skip
+
+
+def test_every_number_of_a_recipe_has_words():
+    assert {field.name for field in fields(Recipe)} <= set(WORDS)
 
 
 def test_a_replay_claims_no_learning(tmp_path, run):
