@@ -251,6 +251,28 @@ def test_a_page_leads_to_the_runs_on_clips_which_bear_any_name(tmp_path):
     assert re.findall('href="([^"]+)"', itself) == ["prepare.html"]
 
 
+def test_of_other_runs_on_clips_a_clips_page_says_which_are_its_own(tmp_path):
+    """A clip was prepared, and learnt from for push and slide; another one has a run as well."""
+    for name, mark in {"prepare/push-a": "7", "push-a": "7", "slide-a": "7", "push-b": "8"}.items():
+        folder = tmp_path / name
+        folder.mkdir(parents=True)
+        (folder / "prepare.json").write_text(f'{{"mark": "{mark}"}}')
+        for page in ("prepare.html", "report.html", "settings.json"):
+            if not name.startswith("prepare") or page == "prepare.html":
+                (folder / page).touch()
+
+    def said(page):
+        return re.findall(r">([^<>]*run[^<>]*)</a>", links.links(tmp_path / page, tmp_path))
+
+    others = ["a run on another clip: push-b", "a run on this clip: slide-a"]
+    assert said("prepare/push-a/prepare.html") == ["a run on this clip: push-a", *others]
+    assert said("push-a/prepare.html") == ["the run on this clip", *others]
+    assert said("push-a/report.html") == ["the clip of this run", *others]
+    assert said("gallery/index.html") == [
+        f"a run on a clip: {n}" for n in ("push-a", "push-b", "slide-a")
+    ]
+
+
 def test_a_figure_is_described_by_its_own_words():
     from matplotlib.figure import Figure
 

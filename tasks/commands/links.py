@@ -74,12 +74,15 @@ def links(page: Path, runs: Path = RUNS) -> str:
     if needs and page.with_name(needs).exists():
         items.append(f'<a href="{file}">{name}</a>')
     reports = {f"{task}/report.html": (f"a run of {task}", "") for task in tasks.TASKS}
+    own = noted(here.parent).get("mark")
     for clip in sorted(runs.glob("*/prepare.html")):  # which a run on a clip has in its folder
-        run = clip.parent.name
-        reports.setdefault(f"{run}/report.html", (f"a run on a clip: {run}", ""))
+        run, which = clip.parent.name, "a clip"
+        if own:
+            which = "this clip" if noted(clip.parent).get("mark") == own else "another clip"
+        reports.setdefault(f"{run}/report.html", (f"a run on {which}: {run}", ""))
     for file, (name, command) in (PAGES | reports).items():
         there = runs / file
-        if there == here:
+        if there in (here, here.with_name("report.html")):  # that is named already
             continue
         if there.exists() and here.is_relative_to(runs):
             way = Path(os.path.relpath(there, here.parent)).as_posix()
