@@ -58,8 +58,8 @@ class Stranger:
     @property
     def reason(self) -> str:
         """A pattern of the reason for which it is not usable; "" if it is usable."""
-        if self.kind == "pulled" and self.task == "slide":
-            return FAULTS["pulled"] + "|goes along"
+        if self.kind in ("pulled", "hidden") and self.task == "slide":
+            return FAULTS[self.kind] + "|goes along"  # the hand does so, and a slide is a hit
         if self.kind == "no arm" and self.task == "reach":
             return FAULTS["still"] + "|no arm"  # a lamp may swing, and nothing else
         return FAULTS.get(self.kind, "")

@@ -56,6 +56,16 @@ def test_a_verdict_is_right_if_its_reason_is():
     assert still.kind in FAULTS
 
 
+@pytest.mark.parametrize("kind", ["pulled", "hidden"])
+def test_of_a_puck_with_which_the_hand_goes_along_that_is_a_right_reason(kind):
+    nothing = np.zeros((1, 2))
+    puck, cube = (
+        Stranger(kind, task, "filmed", nothing, 10, nothing, nothing) for task in ("slide", "push")
+    )
+    pushed = "not usable: the hand goes along with the object to the end; give it a hit."
+    assert judged(puck, pushed) and not judged(cube, pushed)
+
+
 @pytest.mark.slow
 def test_most_verdicts_on_clips_of_strangers_are_right():
     told = trial(HELD_BACK, COUNT, show=lambda *line, **how: None)
