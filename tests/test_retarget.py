@@ -494,6 +494,24 @@ def test_a_way_of_up_to_45_degrees_is_laid_down(steep, usable):
         np.testing.assert_allclose(A @ (0, -200, 0), [0, 0.15], atol=1e-12)
 
 
+@pytest.mark.parametrize("mirror", [False, True])
+def test_a_hand_that_comes_down_to_a_mark_is_turned_with_its_way(mirror):
+    """3 across and 4 down, of length 5, become 5 across: what was 5 below the way's start is now 4
+    ahead of it and 3 below."""
+    scene = replace(SCENE, start=(0.0, 0.0), goal=(5.0, 0.0), contact=None)
+    sign = -1 if mirror else 1
+    A = fit(np.array([10.0 * sign, 20]), np.array([13.0 * sign, 24]), scene, mirror)
+    there = apply(A, np.array([[10.0 * sign, 20], [13 * sign, 24], [10 * sign, 25]]))
+    np.testing.assert_allclose(there, [(0, 0), (5, 0), (4, -3)], atol=1e-12)
+
+
+def test_a_hand_may_come_down_more_steeply_than_a_thing_may_go():
+    scene, start = replace(SCENE, contact=None), np.array([100.0, 100])
+    fit(start, start + (100, 140), scene, False)
+    with pytest.raises(Unusable, match="160 pixels up or down and 100 across"):
+        fit(start, start + (100, 160), scene, False)
+
+
 def test_a_goal_that_is_higher_is_got_to_without_leaning():
     scene = replace(SCENE, start=(0.46, 0.12), goal=(0.68, 0.06))
     A = fit(np.array([10.0, 50]), np.array([120.0, 90]), scene, False)

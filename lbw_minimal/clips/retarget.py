@@ -45,6 +45,9 @@ RUN_UP = 2.0  # s before a hit that are kept
 LITTLE = 0.1
 LONGEST = 12.0  # s, the longest horizon of the tasks; only a hit cannot be hurried
 STEEP = 1.0  # height over width of the way; steeper, and it is not seen from the side
+# The same of a hand that touches nothing, which may come down to its mark. Real hands seen from the
+# side had up to 1.1, painted ones from the front or from straight above 2.6 and more.
+STEEP_HAND = 1.5
 CARRIED = 0.85  # of its way: a hand that goes along so far has not hit
 OUTSIDE = 0.02  # m out of the tip's box; until then the approach stands in for the clip
 TOO_FAST = 1.5  # times what it may ask for: slowed down by more is worth a warning
@@ -147,11 +150,13 @@ def fit(start: np.ndarray, end: np.ndarray, scene: Scene, mirror: bool) -> np.nd
     """The affine map (2, 3) from pixels to metres that takes start and end to the scene's.
 
     Widths and heights are scaled alike. A way that rises or falls in the picture, because the
-    camera turns aside or is not level, is laid down by a shear, which leaves upright what is.
+    camera turns aside or is not level, is laid down by a shear, which leaves upright what is. The
+    way of a hand that touches nothing is turned: nothing in it has to stay upright.
     Raises Unusable where the way is not one across the picture, or goes backwards.
     """
     (dx, dy), sign = end - start, -1 if mirror else 1
-    if abs(dy) > STEEP * abs(dx):
+    touched = scene.contact is not None
+    if abs(dy) > (STEEP if touched else STEEP_HAND) * abs(dx):
         raise Unusable(
             f"it goes {abs(dy):.0f} pixels up or down and {abs(dx):.0f} across",
             "film from the side, at the height of the table, so that it goes across the picture",
@@ -161,9 +166,13 @@ def fit(start: np.ndarray, end: np.ndarray, scene: Scene, mirror: bool) -> np.nd
             "it goes to the left in the picture, once mirrored or not as was asked",
             "leave out --mirror or --no-mirror",
         )
-    scale = (scene.goal[0] - scene.start[0]) / abs(dx)  # m per pixel
-    shear = (scene.goal[1] - scene.start[1] + scale * dy) / dx
-    A = np.array([[sign * scale, 0], [shear, -scale]])
+    x, z = np.subtract(scene.goal, scene.start)
+    if touched:
+        scale = x / abs(dx)  # m per pixel
+        A = np.array([[sign * scale, 0], [(z + scale * dy) / dx, -scale]])
+    else:
+        turn = complex(x, z) / complex(abs(dx), -dy)  # m per pixel
+        A = np.array([[sign * turn.real, turn.imag], [sign * turn.imag, -turn.real]])
     return np.column_stack([A, scene.start - A @ start])
 
 
