@@ -332,7 +332,7 @@ def test_patches_are_looked_for_and_chosen_as_they_were(pushed, golden):
     shots = np.concatenate([frames, frames[:, :, ::-1]])
     both = Found(*map(np.concatenate, both))
     mend = [
-        patches.mended(shots[part], Found(*(values[part] for values in vars(both).values())))
+        patches.mended(shots[part], Found(*(values[part] for values in vars(both).values())))[0]
         for part in (slice(32), slice(32, 64))
     ]
     small, figures = patches.shrunk(frames[::2], 0.8), {}

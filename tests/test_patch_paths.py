@@ -80,8 +80,10 @@ def test_two_patches_agree_if_they_go_four_pixels_alike_wherever_they_are():
     own = path(WAITS)
     assert own.agrees(path(np.add(WAITS, 50), y=30), 1.0)
     off = np.array(WAITS, float)
-    off[5] += 6
-    assert not own.agrees(path(off), 1.0) and own.agrees(path(off), 0.8)
+    off[4] += 3.9
+    off[5] += 4.1
+    assert own.beside(path(off)).tolist() == [t != 5 for t in range(10)]
+    assert own.agrees(path(off), 0.9) and not own.agrees(path(off), 0.91)
 
 
 def test_the_worth_is_of_what_is_seen_and_of_up_to_three_tenths_of_waiting():
@@ -221,7 +223,7 @@ def mended_by(monkeypatch, best, frames, found):
     asked = []
     monkeypatch.setattr(patches, "paths", lambda small, places, tip: asked.append(small) or [])
     monkeypatch.setattr(patches, "chosen", lambda some: best)
-    return patches.mended(frames, found), asked[0]
+    return patches.mended(frames, found)[0], asked[0]
 
 
 def test_patches_are_looked_for_in_48_frames_of_160_pixels_and_come_back_in_the_clips(monkeypatch):
@@ -268,5 +270,6 @@ def test_no_patch_is_looked_for_where_the_detectors_own_path_is_an_objects(monke
         monkeypatch.setattr(patches, "paths", lambda *what, to=asked: to.append(what) or [])
         own = np.stack([x, np.full(40, 50.0)], 1)
         found = Found(0 * own, own, np.zeros(40), np.ones(40))
-        mend = patches.mended(np.zeros((40, 120, 160, 3), np.uint8), found)
+        mend, pushed = patches.mended(np.zeros((40, 120, 160, 3), np.uint8), found)
         assert bool(asked) == looked_for and (mend.object == own).all()
+        assert pushed != looked_for

@@ -164,7 +164,7 @@ def test_patches_mend_what_the_shipped_detector_finds_and_corners_refine_it(monk
         return SimpleNamespace(detect=lambda seen: Found(*[seen[:, 0, 0, 0] + 10 * len(seen)] * 4))
 
     def mended(seen, found):  # each time by 100 and the shot's frames
-        return replace(found, object=found.object + 100 + len(seen))
+        return replace(found, object=found.object + 100 + len(seen)), True
 
     monkeypatch.setattr(prepare, "Detector", SimpleNamespace(load=detector))
     monkeypatch.setattr(prepare, "mended", mended)
@@ -196,7 +196,7 @@ def test_the_surer_look_counts_and_for_a_hand_that_touches_nothing_the_one_at_wh
         sure = [np.full(n, 0.9 if n == by else 0.5 + 0.1 * n / 5) for by in (tip_by, object_by)]
         return Found(*[np.arange(n) + 10 * n] * 2, *sure)
 
-    monkeypatch.setattr(prepare, "mended", lambda frames, found: found)
+    monkeypatch.setattr(prepare, "mended", lambda frames, found: (found, True))
     monkeypatch.setattr(prepare, "gone", lambda found: 0.0)
     found = prepare.looked(SimpleNamespace(detect=detect), frames, touched)
     assert found.tip.tolist() == tip and found.object.tolist() == thing
@@ -204,19 +204,25 @@ def test_the_surer_look_counts_and_for_a_hand_that_touches_nothing_the_one_at_wh
 
 
 @pytest.mark.parametrize(
-    ("ways", "touched", "object_"),
-    [((5, 3, 4), True, 0), ((5, 5, 9), True, 2), ((5, 9, 5), True, 1), ((5, 9, 9), False, 0)],
-    ids=["the-surer", "at-what-moves", "at-all", "nothing-is-touched"],
+    ("ways", "pushed", "touched", "object_"),
+    [
+        ((5, 3, 4), (0, 0, 0), True, 0),
+        ((5, 5, 9), (1, 1, 1), True, 2),
+        ((5, 9, 5), (0, 0, 0), True, 1),
+        ((5, 9, 4), (0, 0, 1), True, 2),
+        ((5, 9, 9), (0, 1, 1), False, 0),
+    ],
+    ids=["the-surer", "at-what-moves", "at-all", "as-one-that-is-pushed", "nothing-is-touched"],
 )
-def test_of_what_patches_make_of_the_looks_the_object_goes_farthest(
-    ways, touched, object_, monkeypatch
+def test_of_what_patches_make_of_the_looks_the_object_is_pushed_or_else_goes_farthest(
+    ways, pushed, touched, object_, monkeypatch
 ):
     """The tip stays the surer look's. Patches are asked of it, of the whole look, of the other."""
     asked = []
 
     def mended(seen, found):
-        asked.append(len(asked))
-        return replace(found, tip=found.tip - 1, object=np.full(len(seen), asked[-1]))
+        asked.append(n := len(asked))
+        return replace(found, tip=found.tip - 1, object=np.full(len(seen), n)), bool(pushed[n])
 
     def detect(seen):
         n = len(seen)
@@ -242,7 +248,7 @@ def test_a_hand_that_touches_nothing_may_be_told_by_its_outline(touched, monkeyp
         return replace(found, tip=found.tip + 1)
 
     monkeypatch.setattr(prepare, "told", lambda frames: np.arange(2))
-    monkeypatch.setattr(prepare, "mended", lambda frames, found: found)
+    monkeypatch.setattr(prepare, "mended", lambda frames, found: (found, True))
     monkeypatch.setattr(prepare, "reaching", outline)
     frames = np.zeros((10, 84, 84, 3), np.uint8)
     found = prepare.looked(SimpleNamespace(detect=detect), frames, touched)

@@ -30,7 +30,10 @@ LEFT = 4  # things that are looked at because they are gone in the end, or have 
 PLAIN = 2  # grey levels, the deviation of a patch in which nothing is seen
 PEAKS = 10  # places in a frame where a patch may be
 APART = 4  # pixels between these; paths that differ by less go the same way
+# Of the frames, in which two patches have to go the same way: in half of them all may rest.
+MOST = 0.67
 AGREE = 2  # paths: one that goes a way of its own is chance
+KEPT = 0.9  # of the frames, in which the detector's path is the patch's: it is known better
 LEAP, STRAY = 12.0, 1.5  # pixels from frame to frame, and what they cost, in correlation
 ALIKE = 0.6  # a correlation, from which on a patch is the same thing
 SEEN = 0.4  # share of the frames in which it has to be
@@ -91,10 +94,14 @@ class Path:
             return False
         return bool(steps.sum() < TO_AND_FRO * way and steps.max() < LEAPS * way)
 
-    def agrees(self, other: Path, share: float = 0.5) -> bool:
-        """Whether another patch goes the same way, beside it, in that share of the frames."""
+    def beside(self, other: Path) -> np.ndarray:
+        """In which frames (n,) bool another patch is where it is in most of them: beside it."""
         off = self.places - other.places
-        return bool(np.quantile(np.abs(off - np.median(off, axis=0)).max(1), share) < APART)
+        return np.abs(off - np.median(off, axis=0)).max(1) < APART
+
+    def agrees(self, other: Path, share: float) -> bool:
+        """Whether another patch goes the same way, beside it, in that share of the frames."""
+        return bool(self.beside(other).mean() >= share)
 
     @property
     def worth(self) -> float:
@@ -102,11 +109,13 @@ class Path:
         return float((self.alike > ALIKE).mean() + 0.5 * self.alike.mean() + min(self.alone, 0.3))
 
 
-def mended(frames: np.ndarray, found: Found) -> Found:
-    """Found in a shot, with the path of the best patch where the object's does not move as one.
+def mended(frames: np.ndarray, found: Found) -> tuple[Found, bool]:
+    """Found in a shot, with the path of the best patch where the object's does not move as one, and
+    whether it moves as one now.
 
     Where no patch moves as an object does either, the detector is believed, unless most of what it
-    saw rests: then nothing moves.
+    saw rests: then nothing moves. Where both go the same way the detector is believed as well, for
+    a patch is known to a pixel only; but not in the frames in which it is off that way.
     """
     k = np.unique(np.linspace(0, len(frames) - 1, LOOK_AT).round().astype(int))
     scale = min(1.0, SMALL / max(frames.shape[1:3]))
@@ -114,19 +123,23 @@ def mended(frames: np.ndarray, found: Found) -> Found:
     side = round(min(frames.shape[1:3]) * scale)
     own = Path(found.object[k] * scale, found.object_sure[k], tip, side)
     if own.seen and own.pushed:
-        return found
+        return found, True
     small = shrunk(frames[k], scale)
     changed = _changed(small)
     best = chosen(paths(small, _seen(found, k, scale) + [(0, at) for at in changed], tip))
     if best is None:  # a small thing may be hidden where it was, and in sight where it got to
         best = chosen(paths(small, [(len(k) - 1, at) for at in changed], tip))
-    if best is None or best.agrees(own, 0.9):  # a patch is known to a pixel only
-        return found
+    if best is None:
+        return found, False
     along = np.arange(len(frames))
+    if best.agrees(own, KEPT):
+        nearest = np.abs(along[:, None] - k).argmin(axis=1)
+        sure = np.where(best.beside(own)[nearest], found.object_sure, 0)
+        return replace(found, object_sure=sure), best.pushed
     places = [np.interp(along, k, best.places[:, axis] / scale) for axis in (0, 1)]
     # A patch that is just alike is just sure.
     sure = np.interp(along, k, np.clip(1 + (best.alike - 1) / 0.8, 0, 1))
-    return replace(found, object=np.stack(places, 1), object_sure=sure)
+    return replace(found, object=np.stack(places, 1), object_sure=sure), best.pushed
 
 
 def gone(found: Found) -> float:
@@ -136,12 +149,16 @@ def gone(found: Found) -> float:
 
 
 def chosen(some: list[Path]) -> Path | None:
-    """The path of the object among those of patches; None if none is better than the detector."""
+    """The path of the object among those of patches; None if none is better than the detector.
+
+    It is the one with which most agree: one that is followed wrongly may be as like its patch.
+    """
     seen = [path for path in some if path.seen]
     pushed = [path for path in seen if path.pushed]
-    pushed = [path for path in pushed if sum(path.agrees(other) for other in pushed) >= AGREE]
-    if pushed:
-        return max(pushed, key=lambda path: path.worth)
+    agree = [sum(path.agrees(other, MOST) for other in pushed) for path in pushed]
+    if max(agree, default=0) >= AGREE:
+        best = [path for path, n in zip(pushed, agree, strict=True) if n == max(agree)]
+        return max(best, key=lambda path: path.worth)
     still = [path for path in seen if path.way < MOVED]
     return max(still, key=lambda path: path.worth) if len(still) > len(some) / 2 else None
 

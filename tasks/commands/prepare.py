@@ -248,7 +248,7 @@ def looked(model: Detector, frames: np.ndarray, touched: bool) -> Found:
     object are each told by the look that is surer of it. Where nothing is touched a hand rests
     longest, at its mark, and the look at what moves tells it, or its outline. Patches take the
     object from the tip's way: beside a wrong tip they find what rests. So they ask each look, and
-    what goes farthest is the object.
+    what moves as an object does, or else goes farthest, is the object.
     """
     whole, kept = model.detect(frames), told(frames)
     last = np.searchsorted(kept, np.arange(len(frames)), side="right") - 1
@@ -261,7 +261,7 @@ def looked(model: Detector, frames: np.ndarray, touched: bool) -> Found:
     looks = [surer]
     if touched:  # the one that is surer of both is asked already
         looks += [one for one in (whole, moving) if not (one is hand and one is thing)]
-    thing = max((mended(frames, one) for one in looks), key=gone)
+    thing, _ = max((mended(frames, one) for one in looks), key=lambda m: (m[1], gone(m[0])))
     return Found(hand.tip, thing.object, hand.tip_sure, thing.object_sure)
 
 
