@@ -196,17 +196,18 @@ def follow(result: Prepared, choices: Choices) -> Motion:
     arm = coming_in(frames[seen.shot], seen.off)
     if seen.still and arm.seen < arms.SEEN:
         raise Unusable(*seen.still)
-    found = look(frames, clip.cuts, result.scene.contact is not None)
+    touched = result.scene.contact is not None
+    found, doubt = look(frames, clip.cuts, touched), arm.doubt if touched else arm.doubt_in_reach
     tracks = Tracks(
         clip.times, found.tip, found.object, found.tip_sure, found.object_sure,
         min(height, width), tuple(clip.cuts), arm.enters, seen.unmoved,
     )  # fmt: skip
     tracks = tracks.marked("tip", list(choices.tip)).marked("object", list(choices.object))
     result.tracks, result.notes = tracks, result.notes + [choices.placed] * bool(choices.placed)
-    if arm.doubt:
+    if doubt:
         if not choices.tip:
-            raise Unusable(*arm.doubt)
-        reason, _ = arm.doubt
+            raise Unusable(*doubt)
+        reason, _ = doubt
         result.warnings.append(
             f"{reason[0].upper()}{reason[1:]}: it was searched all the same, because you placed "
             "the tip."
@@ -217,7 +218,7 @@ def follow(result: Prepared, choices: Choices) -> Motion:
         f"{FPS} a second, by the time stamps."
     )
     motion = lay(tracks, result.scene, choices.mirror)
-    if result.scene.contact is not None and not choices.object:
+    if touched and not choices.object:
         touch, there = motion.times[[motion.contact, motion.arrival]]
         result.warnings += unlike(frames, tracks, touch, there)
     return motion
