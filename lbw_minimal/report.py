@@ -49,6 +49,8 @@ from lbw_minimal.report_texts import (
     SMOKE,
     VIDEOS,
     WORDS,
+    options,
+    shell,
 )
 from lbw_minimal.training import quantity, write_atomic
 
@@ -186,16 +188,15 @@ def section(title: str, *body: str, kind: str = "") -> list[str]:
 def again(command: str, clip: dict[str, str]) -> list[str]:
     """The section with the run's command, and before it the one that prepared a person's clip."""
     lines = "\n".join(filter(None, [clip.get("command"), command]))
-    return section("To make this run again", f"<pre>{escape(lines)}</pre>")
+    return section("To make this run again", shell(lines))
 
 
 def whose(clip: dict[str, str] | None) -> str:
     """Which clip that is, and what its owner decided: the "clip"'s name and its "corrections"."""
     if not clip:
         return ""
-    how = (
-        f"corrected by <code>{escape(c)}</code>" if (c := clip["corrections"]) else "not corrected"
-    )
+    c = clip["corrections"]
+    how = f"corrected by <code>{options(c)}</code>" if c else "not corrected"
     return f"<p><b>{escape(clip['clip'])}</b>, {how}.</p>"
 
 

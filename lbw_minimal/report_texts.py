@@ -5,6 +5,8 @@ Texts that depend on the method have its name as a key; where both rivals share 
 
 from __future__ import annotations
 
+from html import escape
+
 CSS = """
 :root { color-scheme: light; --page: #fff; --ink: #1b1b1b; --soft: #555; --panel: #f2f4f7;
         --line: #ddd; --note: #fff3d6; --link: #0b57d0 }
@@ -16,16 +18,18 @@ CSS = """
 body { margin: 0 auto; max-width: 56rem; padding: 1rem 1rem 4rem; background: var(--page);
        color: var(--ink); font: 1rem/1.55 system-ui, sans-serif }
 a { color: var(--link) }
+nav code { white-space: nowrap }
 nav { display: flex; flex-wrap: wrap; gap: .2rem 1.2rem; font-size: .85rem; color: var(--soft) }
 h1 { font-size: 1.9rem; line-height: 1.2; margin: 1rem 0 .5rem }
 h2 { font-size: 1.25rem; margin: 2.6rem 0 .4rem; padding-top: 1.2rem;
      border-top: 1px solid var(--line) }
 p, ol { max-width: 44rem; margin: .5rem 0 }
 img, iframe { max-width: 100%; border: 0; display: block }
+img { cursor: zoom-in } img:fullscreen { cursor: zoom-out }
 iframe { width: 100%; height: min(26rem, 65vh) }
 .tiles, .row { display: flex; flex-wrap: wrap; gap: .75rem; margin: 1rem 0 }
 .tiles div { flex: 1 1 8rem; background: var(--panel); border-radius: 8px; padding: .6rem .9rem }
-.tiles b { display: block; font-size: 1.35rem }
+.tiles b { display: block; font-size: 1.35rem; white-space: nowrap }
 .tiles span, figcaption, .small { color: var(--soft); font-size: .85rem }
 .row > img { flex: 1 1 20rem; min-width: 0 }
 .strip { display: grid; grid-template-columns: repeat(8, 1fr); gap: .5rem .3rem; margin: 1rem 0 }
@@ -38,6 +42,7 @@ table { border-collapse: collapse; margin: .8rem 0; font-size: .92rem; display: 
 th, td { text-align: left; padding: .25rem 1.1rem .25rem 0; border-bottom: 1px solid var(--line) }
 pre { white-space: pre-wrap; overflow-wrap: anywhere; background: var(--panel);
       border-radius: 8px; padding: .7rem .9rem }
+.word { display: inline-block; max-width: 100% }
 .still { display: none }
 @media print { nav, .scene, iframe { display: none } .still { display: block }
                h1, h2, h2 + p { break-after: avoid } h2, figure, img, tr { break-inside: avoid } }
@@ -55,9 +60,27 @@ HTML = """<!DOCTYPE html>
 {links}<main>
 {body}
 </main>
+<script>
+addEventListener("click", ({{target}}) => {{  // a picture is shown as large as the screen, and back
+  if (document.fullscreenElement) document.exitFullscreen();
+  else if (target.matches("img:not(.clip img)")) target.requestFullscreen?.();
+}});
+</script>
 </body>
 </html>
 """
+
+
+def shell(lines: str) -> str:
+    """Lines for a terminal as HTML."""
+    return f"<pre>{chr(10).join(map(options, lines.splitlines()))}</pre>"
+
+
+def options(line: str) -> str:
+    """A line, or a part of one, as HTML. A word breaks only where it is longer than the page is
+    wide, since a browser would break an option at its hyphens."""
+    return " ".join(f'<span class="word">{escape(word)}</span>' for word in line.split(" "))
+
 
 INTRODUCTION = {
     "lbw": """

@@ -1,5 +1,6 @@
 """The kit's pages on a wide screen, on a phone and on paper: legible, described, and whole."""
 
+import asyncio
 import re
 
 import nbformat
@@ -98,6 +99,23 @@ PAPER = """
 })()
 """
 
+# Options and intervals of which a part is in another line.
+BROKEN = """
+[...document.querySelectorAll("pre, .tiles b")].flatMap(e => {
+  const texts = document.createTreeWalker(e, NodeFilter.SHOW_TEXT), broken = [];
+  while (texts.nextNode()) {
+    const node = texts.currentNode, range = document.createRange();
+    for (const {index, 0: word} of node.textContent.matchAll(/--[a-z-]+|\\d+-\\d+ %/g)) {
+      range.setStart(node, index);
+      range.setEnd(node, index + word.length);
+      if (new Set([...range.getClientRects()].map(r => r.top)).size > 1) broken.push(word);
+    }
+  }
+  return broken;
+})
+"""
+LARGE = "document.fullscreenElement?.alt"
+
 
 def book_page():
     """A page of the book with long code, what check() says, a figure and a scene."""
@@ -141,7 +159,8 @@ def write_pages(folder):
     (folder / "contents.html").write_text(course.contents())
     (folder / "glossary.html").write_text(course.glossary())
     others = links.links(folder / "report.html")
-    run = a_run.example() | {"command": f"python -m tasks push --out {'folder/' * 20}"}
+    more = "--translate-clip --from-scratch " * 6
+    run = a_run.example() | {"command": f"python -m tasks push {more}--out {'folder/' * 20}"}
     report.write_report(folder / "report.html", **run, links=others)
     outcomes = [
         {"label": "the value", "points": 0, "most": 2, "message": "the sign is wrong"},
@@ -170,11 +189,23 @@ async def look(folder):
                 await page.call("Emulation.setDeviceMetricsOverride", mobile=width == PHONE, **size)
                 await page.call("Emulation.setEmulatedMedia", media=media)
                 seen[name].append(await page.js(code))
+                if width == PHONE:
+                    seen[name][-1]["broken"] = await page.js(BROKEN)
             size["width"] = WIDE
             await page.call("Emulation.setDeviceMetricsOverride", mobile=False, **size)
             await page.call("Emulation.setEmulatedMedia", media="screen", features=night)
             seen[name].append(await page.js(AUDIT) | await page.js(PLACES))
             await page.call("Emulation.setEmulatedMedia", media="screen", features=[])
+        await page.call("Page.navigate", url=(folder / "report.html").as_uri())
+        await page.until(
+            "location.pathname.endsWith('/report.html') && document.readyState", "complete"
+        )
+        seen["large"] = []
+        for _ in range(2):
+            click = "document.querySelectorAll('.strip img')[2].click()"
+            await page.call("Runtime.evaluate", expression=click, userGesture=True)
+            await asyncio.sleep(0.5)
+            seen["large"].append(await page.js(LARGE))
     return seen
 
 
@@ -187,7 +218,11 @@ def seen(tmp_path_factory):
 def test_a_page_can_be_read_on_a_screen_and_on_a_phone(seen, name):
     wide, phone, *_ = seen[name]
     # Beside a wide screen's code a reader may scroll, as in an editor.
-    assert wide | {"scrolls": []} == FINE and phone == FINE
+    assert wide | {"scrolls": []} == FINE and phone == FINE | {"broken": []}
+
+
+def test_a_picture_is_as_large_as_the_screen_after_a_click_and_small_after_another(seen):
+    assert seen["large"] == ["Frame 3 of the video and its translation with keypoints", None]
 
 
 @pytest.mark.parametrize("name", OURS)

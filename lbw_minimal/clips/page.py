@@ -27,7 +27,7 @@ from lbw_minimal.pictures import (
     svg,
 )
 from lbw_minimal.report import section, table
-from lbw_minimal.report_texts import CSS, HTML
+from lbw_minimal.report_texts import CSS, HTML, shell
 from lbw_minimal.training import write_atomic
 
 SCALE = 3  # of the film's pictures, 84 pixels wide
@@ -110,13 +110,13 @@ def write_page(
     if motion is not None:
         figure = courses(motion, scene, states)
         page += section("The motion in the scene", SCENE, picture(svg(figure), "Paths over time"))
-    again = "" if clickable else f"<pre>{escape(command)}</pre>"
+    again = "" if clickable else shell(command)
     options = OPTIONS[: 1 if clickable and tracks is None else None]  # no other is of any help
     height, width = frames.shape[1:3]
     said = [(name, text.format(width=width, height=height)) for name, text in options]
     page += section("To decide otherwise", table(said), again)
     if learn:
-        page += section("Next", FIRST, "<p>The robot learns it:</p>", f"<pre>{escape(learn)}</pre>")
+        page += section("Next", FIRST, "<p>The robot learns it:</p>", shell(learn))
     title = f"{escape(task)}: a clip of one's own"
     body = "".join(page)
     write_atomic(path, HTML.format(title=title, css=CSS + STRIP, links=links, body=body))

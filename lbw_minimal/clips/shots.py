@@ -20,9 +20,11 @@ TIP, OBJECT = (213, 94, 0), (86, 180, 233)  # Okabe and Ito's vermilion and sky 
 FROM, TO = (255, 255, 255), (0, 0, 0)  # what marks the first and the last picture to use
 STRIP = """
 .clip { display: grid; grid-template-columns: repeat(auto-fill, minmax(15rem, 1fr)); gap: .6rem }
+.clip.upright { grid-template-columns: repeat(auto-fill, minmax(9rem, 1fr)) }
 .clip figure { margin: 0 }
 .clip img { width: 100%; display: block; cursor: crosshair }
 .clip .unused img { filter: grayscale(1) opacity(.4) }
+td:first-child { white-space: nowrap }
 .shot { display: block; position: relative }
 .click { position: absolute; width: 12px; height: 12px; margin: -6px; border: 2px solid #000;
          border-radius: 50%; pointer-events: none; outline: 1px solid #fff }
@@ -80,7 +82,12 @@ SCRIPT = """
 const base = %s, colours = %s, marks = new Map();
 const [pre, copy, again] = ["command", "copy", "again"].map(id => document.getElementById(id));
 const show = () => {
-  pre.textContent = [base, ...[...marks.values()].map(mark => mark.option)].join(" ");
+  const words = [base, ...[...marks.values()].map(mark => mark.option)].join(" ").split(" ");
+  pre.replaceChildren(...words.flatMap(word => {  // as in `shell`
+    const span = document.createElement("span");
+    Object.assign(span, {className: "word", textContent: word});
+    return [span, " "];
+  }).slice(0, -1));
   copy.textContent = "Copy";
   const [from, to] = ["from", "to"].map(key => marks.get(key)?.time);
   document.getElementById("swapped").toggleAttribute("hidden", !(+to < +from));
@@ -168,7 +175,8 @@ def clip_frames(
             f'src="{data_uri("image/webp", file)}"></span>'
             f"<figcaption>{caption}</figcaption></figure>"
         )
-    return f'<div class="clip">{"".join(figures)}</div>'
+    upright = " upright" if frames.shape[1] > frames.shape[2] else ""
+    return f'<div class="clip{upright}">{"".join(figures)}</div>'
 
 
 def _how_sure(tracks, name, i):
