@@ -279,7 +279,7 @@ def figures(metrics: dict[str, Any]) -> list[str]:
     if stages and "policy" not in stages:
         recipe = {}  # a replay follows none
     settings = in_words(given)
-    settings += [(*row, name) for name, value in recipe.items() for row in in_words({name: value})]
+    settings += [(WORDS[name], f"{name}={value:g}") for name, value in recipe.items()]
     settings += in_words({k: v for k, v in metrics.items() if k in MACHINE})
     about = SET if recipe else ""
     return page + (section("Settings", about, table(settings)) if settings else [])
@@ -296,7 +296,7 @@ def score(value: dict | None) -> str:
     return f"{value['r2']:.3f} ({value['px']:.1f})" if value and value["r2"] is not None else "-"
 
 
-def in_words(tree: dict[str, Any]) -> list[tuple[str, ...]]:
+def in_words(tree: dict[str, Any]) -> list[tuple[str, str]]:
     """The rows of `flat` with names for people, without what is not set."""
     return [(WORDS.get(name, name), value) for name, value in flat(tree) if value]
 

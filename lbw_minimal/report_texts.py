@@ -45,7 +45,10 @@ pre { white-space: pre-wrap; overflow-wrap: anywhere; background: var(--panel);
 .word { display: inline-block; max-width: 100% }
 .still { display: none }
 @media print { nav, .scene, iframe { display: none } .still { display: block }
-               h1, h2, h2 + p { break-after: avoid } h2, figure, img, tr { break-inside: avoid } }
+               body { font-size: .85rem; padding: 0 } h2 { margin-top: 1.2rem }
+               h1, h2, h2 + p, p:has(+ pre), p:has(+ img) { break-after: avoid }
+               p, li, pre, h2, figure, img, tr { break-inside: avoid }
+               img { max-height: 9cm; max-width: 100% } }
 """
 
 HTML = """<!DOCTYPE html>
@@ -269,7 +272,7 @@ SMOKE = "This was a smoke run: no stage ran long enough to learn. Its figures sa
 GOAL = "An episode is a success if {}."
 LEARNT = "Learnt in this run: {}. The rest was trained before."
 REPLAY = "A replay: nothing was learnt in this run. What it shows was trained before."
-SET = '<p class="small">The names on the right are those that --set NAME=VALUE takes.</p>'
+SET = '<p class="small">The numbers of the recipe are written as <code>--set</code> takes them.</p>'
 
 # What the names in metrics.json mean.
 WORDS = {

@@ -63,6 +63,13 @@ def write(folder):
 
 CHOICES = "[...document.querySelectorAll('[name=what]')].map(e => e.value + +e.checked)"
 END = '[...document.querySelectorAll("section")].at(-1).innerText.split("\\n")'
+# What can be clicked, and how many pictures of the clip stand side by side.
+PAPER = """
+[[...document.querySelectorAll("input, button, summary")].filter(e => e.checkVisibility()
+   && !e.closest(".film")).length,
+ (tops => tops.filter(top => top === tops[0]).length)(
+   [...document.querySelectorAll(".clip img")].map(e => e.getBoundingClientRect().top))]
+"""
 
 
 async def look(folder):
@@ -92,6 +99,9 @@ async def look(folder):
             night = [{"name": "prefers-color-scheme", "value": theme}]
             await page.call("Emulation.setEmulatedMedia", features=night)
             states[width, theme] = await page.js(AUDIT)
+        await page.call("Emulation.setEmulatedMedia", media="print")
+        states["paper"] = await page.js(PAPER)
+        await page.call("Emulation.setEmulatedMedia", media="screen")
         states["clicked end"] = await page.js(END)
         await page.js('document.getElementById("again").click()')
         states["none"] = await page.js(STATE)
@@ -179,6 +189,10 @@ def test_after_a_click_the_corrected_command_comes_first(seen):
 @pytest.mark.parametrize("how", [(WIDE, "light"), (PHONE, "light"), (WIDE, "dark")])
 def test_the_page_can_be_read(seen, how):
     assert seen[how] == FINE
+
+
+def test_on_paper_nothing_asks_for_a_click(seen):
+    assert seen["paper"] == [0, 4]
 
 
 @pytest.mark.parametrize(

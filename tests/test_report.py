@@ -298,9 +298,9 @@ def test_settings_are_named_for_people_and_what_is_not_set_is_left_out():
     rows = re.findall("<tr>(.*?)</tr>", "".join(report.figures({"settings": settings})))
     assert [re.findall("<td>(.*?)</td>", row) for row in rows] == [
         ["task", "push"], ["smoke run", "no"], ["perception trained in this run", "yes"],
-        ["seed", "1"], ["keypoints", "5", "K"],
-        ["updates of the policy at each of them", "1", "updates"],
-        ["random motion is shown to it as no goal", "no", "random_negatives"],
+        ["seed", "1"], ["keypoints", "K=5"],
+        ["updates of the policy at each of them", "updates=1"],
+        ["random motion is shown to it as no goal", "random_negatives=0"],
     ]  # fmt: skip
 
 

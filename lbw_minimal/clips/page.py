@@ -49,6 +49,10 @@ FIRST = """
 <p id="first" class="note" hidden>Run the corrected command above first: this one learns the motion
 as it is now.</p>
 """
+SURENESS = """
+<p>How sure the network is of tip and object, over the clip. Below the dotted line a dot is hollow.
+At a black line the whole picture changes.</p>
+"""
 SCENE = """
 <p>The clip's motion in the task's scene, in centimetres, as the simulated human was asked to do it
 (dashed) and did it (solid). Contact and arrival are the two grey lines. Before the clip's hand
@@ -102,7 +106,7 @@ def write_page(
         title = "What was found in the clip" if tracks else "The clip"
         page += section(title, *to_correct(frames, times, tracks, used, command))
     if tracks is not None:
-        page.append(picture(svg(confidence(tracks)), "How sure tip and object were found"))
+        page += [SURENESS, picture(svg(confidence(tracks)), "How sure tip and object were found")]
     if notes:
         page += section(
             "What was done", f"<ul>{''.join(f'<li>{escape(n)}</li>' for n in notes)}</ul>"
@@ -180,7 +184,7 @@ def confidence(tracks: Tracks) -> Figure:
         axis.axhline(SURE, color="grey", lw=1, ls=":")
         for cut in tracks.cuts:
             axis.axvline(tracks.times[cut], color="black", lw=1)
-        axis.set(xlabel="time in the clip (s)", ylabel="sure", ylim=(0, 1.05))
+        axis.set(xlabel="time in the clip (s)", ylabel="sureness", ylim=(0, 1.05))
         axis.legend(loc="lower right", ncols=2)
     return figure
 

@@ -24,10 +24,13 @@ STRIP = """
 .clip figure { margin: 0 }
 .clip img { width: 100%; display: block; cursor: crosshair }
 .clip .unused img { filter: grayscale(1) opacity(.4) }
+label { display: inline-block; margin-right: .8rem }
 td:first-child { white-space: nowrap }
 .shot { display: block; position: relative }
 .click { position: absolute; width: 12px; height: 12px; margin: -6px; border: 2px solid #000;
          border-radius: 50%; pointer-events: none; outline: 1px solid #fff }
+@media print { .clicks { display: none } .clip { grid-template-columns: repeat(4, 1fr) }
+               .clip.upright { grid-template-columns: repeat(6, 1fr) } }
 """
 
 
@@ -77,7 +80,7 @@ CHOICES = {  # by the option that a click writes
 SCRIPT = """
 <pre id="command"></pre>
 <p id="swapped" class="note" hidden>The last picture to use lies before the first.</p>
-<p><button id="copy">Copy</button> <button id="again">Start again</button></p>
+<p class="clicks"><button id="copy">Copy</button> <button id="again">Start again</button></p>
 <script>
 const base = %s, colours = %s, marks = new Map();
 const [pre, copy, again] = ["command", "copy", "again"].map(id => document.getElementById(id));
@@ -143,8 +146,9 @@ def to_correct(
     inks = zip(CHOICES, (TIP, OBJECT, FROM, TO), strict=True)
     colours = json.dumps({name: f"rgb{ink}" for name, ink in inks})
     script = SCRIPT % (json.dumps(command).replace("<", "\\u003c"), colours)
-    said = [LEGEND, CLICK, CUT] if tracks else [ONLY_CUT]
-    return [*said, f"<p>{radios}</p>", clip_frames(frames, times, tracks, used), script]
+    said = CLICK + CUT if tracks else ONLY_CUT
+    clicks = f'<div class="clicks">{said}<p>{radios}</p></div>'
+    return [LEGEND if tracks else "", clicks, clip_frames(frames, times, tracks, used), script]
 
 
 def clip_frames(
