@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +20,7 @@ from matplotlib.figure import Figure
 import tasks
 from lbw_minimal import diagram, video
 from lbw_minimal.pictures import data_uri
-from lbw_minimal.report_texts import CSS, HTML
+from lbw_minimal.report_texts import CSS, HTML, options
 from lbw_minimal.training import write_atomic
 from tasks.commands import Parser, at_least, controls, figures, make_folder, translations
 from tasks.commands.batch import Job, folder, read, run_missing
@@ -64,9 +65,11 @@ PAGE_CSS = (
     CSS
     + """
 body { max-width: 72rem }
+p > code { font-size: .85rem; color: var(--soft) }
+p > code::before { content: "Made by "; font-family: system-ui, sans-serif }
 p:has(img) { max-width: none; overflow-x: auto }
 @media screen and (max-width: 40rem) {
-  p > img { max-width: none; width: 44rem }
+  p > img { max-width: none; width: 44rem } h2:first-of-type + p > img { width: 100% }
   td, th { white-space: nowrap }
 }
 @media print { table { font-size: .72rem } th, td { padding-right: .6rem } }
@@ -178,6 +181,7 @@ def write(plan: Plan) -> Path:
         text += f"\n## {title}\n\n{body}\n`python -m tasks {command}`\n"
     write_atomic(plan.out / "paper.md", text)
     body = str(mistune.html(text)).replace(" %", "\u00a0%")  # no line begins with it
+    body = re.sub("(?<=<code>)[^<]+", lambda command: options(command[0]), body)
     for path in sorted((plan.out / "figures").glob("*.svg")):  # the page needs no other file
         body = body.replace(f"figures/{path.name}", data_uri("image/svg+xml", path.read_bytes()))
     title, path = "Learning by Watching, made again", plan.out / "paper.html"
