@@ -296,7 +296,9 @@ def test_the_quantile_counts_pairs_that_share_nothing():
 
 def test_in_a_class_of_two_nothing_is_said():
     class_ = alike.compare(["a", "b"], {"6.1": {0: ODD, 1: ODD}})
-    assert class_.pairs == [] and "nothing can be said" in alike.alike_page(class_, [set(), set()])
+    page = alike.alike_page(class_, [set(), set()])
+    assert class_.pairs == [] and "nothing can be said" in page
+    assert "No pair shares anything" in page and "The pairs that share most" not in page
 
 
 def test_what_is_compared_is_what_was_graded(tmp_path):

@@ -189,7 +189,8 @@ def alike_page(class_: Class, wrong: list[set[str]]) -> str:
         times = f"{len(found)} of {len(both)}; by chance {mean:.1f}"
         rows.append([link, f"{p.total:.0f}", times, _few(pairs)])
     columns = ["pair", "bits", "same answers", "such pairs by chance"]
-    parts = [head, table("The pairs that share most", columns, rows)]
+    most = table("The pairs that share most", columns, rows)
+    parts = [head, most if rows else "<p>No pair shares anything that counts.</p>"]
     parts += [_beside(class_, i, p, wrong) for i, p in enumerate(class_.pairs[:SHOWN])]
     parts.append("<h2>By exercise</h2>")
     parts += [_exercise(class_, id) for id in class_.trees]

@@ -136,7 +136,8 @@ EXPLAINED = """
 <p>Right is the share of submissions that earned all points of an exercise. Item-rest is the
 correlation of its points with those of all other exercises, and behind it its 95&nbsp;% interval.
 Near 0, good submissions fail it as often as poor ones do, and its text or its checks deserve a
-look; below 0, all the more. Where nearly all are right, or nearly none, it says little.</p>"""
+look; below 0, all the more. Where nearly all are right, or nearly none, it says little. A dash: all
+earned the same points, or there are fewer than three.</p>"""
 
 
 def items_page(items: list[Item], left_out: int) -> str:
@@ -156,12 +157,12 @@ def items_page(items: list[Item], left_out: int) -> str:
 def _share(i: Item) -> str:
     """Said by number and, to the eye, by a bar."""
     bar = f'<span class="bar" aria-hidden="true" style="width: {i.share:.0%}"></span>'
-    return f"{i.share:.0%} ({i.right} of {i.answers}){bar}"
+    return f"{i.share:.0%} ({i.right}&nbsp;of&nbsp;{i.answers}){bar}"
 
 
 def _rest(i: Item) -> str:
     if i.rest is None:
-        return "none: the points do not vary" if i.answers > 2 else "none: too few"
+        return "-"
     return f"{i.rest:.2f}" + ("" if i.low is None else f" ({i.low:.2f} to {i.high:.2f})")
 
 

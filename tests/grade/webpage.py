@@ -30,7 +30,7 @@ details { margin: .4em 0 } summary { cursor: pointer }
 @media print {
   /* What is folded is open on paper, where nobody can unfold it. */
   details::details-content { content-visibility: visible !important; block-size: auto !important }
-  tr, pre { break-inside: avoid }
+  h1, h2, h3 { break-after: avoid } tr, pre, li, p { break-inside: avoid }
 }
 """
 
