@@ -39,7 +39,12 @@ def unusable(result, choices):
 @pytest.mark.parametrize(
     ("share", "tip", "reason", "warnings"),
     [
-        (0.6, (), "one colour fills 60%", ["It is damaged."]),
+        (
+            0.6,
+            (),
+            "it looks like a recording of a screen, since one colour fills 60%",
+            ["It is damaged."],
+        ),
         (0.3, (), "the camera moves", ["It is damaged.", "The camera trembles."]),
         # who has placed the tip has seen an arm there
         (0.6, ((5.0, 5.0, 0.1),), "the camera moves", ["It is damaged.", "The camera trembles."]),

@@ -50,7 +50,7 @@ FIRST = """
 as it is now.</p>
 """
 SURENESS = """
-<p>How sure the network is of tip and object, over the clip. Below the dotted line a dot is hollow.
+<p>How sure the network is of tip and object, over the clip. Below the dashed line a dot is hollow.
 At a black line the whole picture changes.</p>
 """
 SCENE = """
@@ -181,7 +181,7 @@ def confidence(tracks: Tracks) -> Figure:
         axis = figure.subplots()
         axis.plot(tracks.times, tracks.tip_sure, ".-", color=COLOURS[4], label="tip")
         axis.plot(tracks.times, tracks.object_sure, ".-", color=COLOURS[5], label="object")
-        axis.axhline(SURE, color="grey", lw=1, ls=":")
+        axis.axhline(SURE, color="black", lw=1, ls="--")
         for cut in tracks.cuts:
             axis.axvline(tracks.times[cut], color="black", lw=1)
         axis.set(xlabel="time in the clip (s)", ylabel="sureness", ylim=(0, 1.05))

@@ -24,8 +24,7 @@ def recorded(frames: np.ndarray) -> Unusable | None:
     if share < FILLS:
         return None
     return Unusable(
-        f"one colour fills {share:.0%} of the picture, as in a recording of a screen and hardly in "
-        "a camera's film",
+        f"it looks like a recording of a screen, since one colour fills {share:.0%} of the picture",
         "film an arm with a camera",
     )
 
