@@ -328,31 +328,6 @@ def test_a_user_who_places_the_tip_overrules_that_there_is_no_arm(name, monkeypa
     assert result.tracks is not None
 
 
-@pytest.mark.parametrize(
-    ("contact", "tip", "refused"),
-    [(None, (), True), (None, ((5, 5, 0.1),), False), (0.04, (), False)],
-)
-def test_a_hand_that_reaches_comes_in_over_an_edge(contact, tip, refused, monkeypatch):
-    nothing = Found(np.zeros((6, 2)), np.zeros((6, 2)), np.zeros(6), np.zeros(6))
-    monkeypatch.setattr(prepare, "look", lambda frames, cuts, touched: nothing)
-    monkeypatch.setattr(prepare, "coming_in", lambda frames, off: ONE._replace(on_edge=0.0))
-    monkeypatch.setattr(
-        prepare.footage, "check", lambda frames, cuts: Footage(frames, [], slice(None), None, False)
-    )
-    motion = SimpleNamespace(times=np.arange(4) / 10, contact=1, arrival=3)
-    monkeypatch.setattr(prepare, "lay", lambda tracks, scene, mirror: motion)
-    monkeypatch.setattr(prepare, "unlike", lambda *given: [])
-    result = prepared(scene=SimpleNamespace(contact=contact))
-    if refused:
-        with pytest.raises(
-            Unusable, match=r"^the arm does not come in over .*; film from the side"
-        ):
-            follow(result, Choices(tip=tip))
-    else:
-        assert follow(result, Choices(tip=tip)) is motion
-        assert ["faced the camera" in warning for warning in result.warnings] == [True] * len(tip)
-
-
 @pytest.mark.parametrize(("arms", "refused"), [(NONE, True), (ONE, False)])
 def test_where_nothing_seems_to_move_an_arm_that_is_seen_does(arms, refused, monkeypatch):
     nothing = Found(np.zeros((6, 2)), np.zeros((6, 2)), np.zeros(6), np.zeros(6))

@@ -197,17 +197,17 @@ def follow(result: Prepared, choices: Choices) -> Motion:
     if seen.still and arm.seen < arms.SEEN:
         raise Unusable(*seen.still)
     touched = result.scene.contact is not None
-    found, doubt = look(frames, clip.cuts, touched), arm.doubt if touched else arm.doubt_in_reach
+    found = look(frames, clip.cuts, touched)
     tracks = Tracks(
         clip.times, found.tip, found.object, found.tip_sure, found.object_sure,
         min(height, width), tuple(clip.cuts), arm.enters, seen.unmoved,
     )  # fmt: skip
     tracks = tracks.marked("tip", list(choices.tip)).marked("object", list(choices.object))
     result.tracks, result.notes = tracks, result.notes + [choices.placed] * bool(choices.placed)
-    if doubt:
+    if arm.doubt:
         if not choices.tip:
-            raise Unusable(*doubt)
-        reason, _ = doubt
+            raise Unusable(*arm.doubt)
+        reason, _ = arm.doubt
         result.warnings.append(
             f"{reason[0].upper()}{reason[1:]}: it was searched all the same, because you placed "
             "the tip."
