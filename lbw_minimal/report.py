@@ -122,7 +122,7 @@ def write_report(
     if clip is not None:
         page += section("Your clip", CLIP[method], whose(metrics.get("clip")), strip(clip))
     if translated is not None and z_demo is not None and "frames" in episode:
-        page.append(_method(demo, translated, z_demo, episode))
+        page += section("The method", METHOD, _method(demo, translated, z_demo, episode))
     columns = demonstration(demo, translated, z_demo, fps, logits)
     page += section(SHOWN[method], DEMONSTRATION[method], columns)
     if "frames" in episode:
@@ -155,7 +155,7 @@ def _method(demo, translated, z_demo, episode):
     i, j = len(demo) // 2, len(episode["frames"]) // 2
     z = _keypoints(episode, z_demo.shape[1])[j]
     figure = diagram(demo[i], translated[i], z_demo[i], episode["frames"][j], z)
-    return picture(svg(figure), METHOD)
+    return picture(svg(figure), "The method in frames of this run")
 
 
 def _test_episode(demo, translated, z_demo, episode, episodes, fps, kind):

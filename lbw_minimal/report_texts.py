@@ -136,11 +136,12 @@ its <b>reward</b>. How the arm does that is left to it.</li>
 """,
 }
 
-METHOD = (
-    "The method in frames of this run. A frame of the human video is translated, and keypoints are "
-    "found on it. The robot's own keypoints give the policy's action; compared with the video's "
-    "they give the reward, from which SAC learns."
-)
+METHOD = """
+<p>In the upper row a frame of the human video is translated, by a network called MUNIT, and another
+one, Transporter, finds keypoints on it. In the lower one are the robot's own camera and the
+keypoints found there, which give the policy's action. Compared with the video's they give the
+reward, from which the policy learns by SAC, soft actor-critic. Eq. are the paper's equations.</p>
+"""
 
 VIDEOS = {  # what each method learns from
     "lbw": "one video",

@@ -197,7 +197,7 @@ def plain(page):
 
 
 def test_the_page_has_every_section(page):
-    assert len(titles(page)) == 10
+    assert len(titles(page)) == 11 and titles(page)[0] == "The method"
     assert (
         page.count("<img") == 1 + 8 + 1 + 2 + 1 + 1
     )  # method, columns, film, paths, curve, reward
