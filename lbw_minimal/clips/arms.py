@@ -35,11 +35,6 @@ FAINT = 10  # grey levels: at the shoulder an arm moves by little
 COVERS = 0.04  # of the picture: a lamp that swings at its edge covers half of that, an arm twice
 ACROSS = 1.0  # of the width, from edge to edge: between them a lamp may hang beside an arm
 OFTEN = 0.05  # of the frames: an arm at its median place is not told from the room
-# Cells from an edge in which an arm begins, and in how many of the frames that have one: the arms
-# of people who face the camera hang from shoulders inside of the picture, and had 0 in four of 15
-# films; 222 usable clips had 0.13 or more.
-AT_EDGE = 2
-ON_EDGE = 0.05
 
 
 class Arms(NamedTuple):
@@ -50,8 +45,6 @@ class Arms(NamedTuple):
     enters: float  # where the largest comes in, 0 at the picture's left edge, 1 at its right; nan
     moves: bool = False  # whether something as large as an arm moves over an edge
     across: float = 0.0  # share of the frames in which large things are at both side edges
-    # share of the frames with an arm in which it begins at one of these edges; nan
-    on_edge: float = np.nan
 
     @property
     def doubt(self) -> tuple[str, str] | None:
@@ -62,11 +55,6 @@ class Arms(NamedTuple):
             return (
                 "arms come in at two places, as of several people, or of one who fills the picture",
                 "film one arm, without the body, and let nothing else move near the edges",
-            )
-        if self.on_edge < ON_EDGE:
-            return (
-                "the arm does not come in over an edge, as if a person faced the camera",
-                SIDE_ON,
             )
         return None
 
@@ -87,7 +75,6 @@ def count(masks: np.ndarray, off: np.ndarray) -> Arms:
         enters=float(np.median(places)) if places else np.nan,
         moves=_comes_in(off > FAINT),
         across=float((np.nan_to_num(np.ptp(doors, axis=1)) >= ACROSS).mean()),
-        on_edge=_on_edge(masks),
     )
 
 
@@ -107,18 +94,6 @@ def _coming_in(mask):
         if inside[piece].max() >= REACHES * door.sum() / NEAR:
             arms.append((left, left + width, cells, float(x[door].mean()) / w))
     return arms
-
-
-def _on_edge(masks):
-    """In which share of the masks (n, h, w) with an arm its largest piece begins at the left, the
-    right or the upper edge; nan if there is none."""
-    on = []
-    for mask in masks:
-        _, _, stats, _ = cv2.connectedComponentsWithStats((mask > SURE).astype(np.uint8))
-        left, top, width, _, cells = max(stats[1:].tolist(), key=lambda s: s[4], default=[0] * 5)
-        if cells >= LEAST:
-            on.append(min(left, top, mask.shape[1] - left - width) < AT_EDGE)
-    return float(np.mean(on)) if on else np.nan
 
 
 def _comes_in(moves):

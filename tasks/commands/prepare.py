@@ -196,8 +196,7 @@ def follow(result: Prepared, choices: Choices) -> Motion:
     arm = coming_in(frames[seen.shot], seen.off)
     if seen.still and arm.seen < arms.SEEN:
         raise Unusable(*seen.still)
-    touched = result.scene.contact is not None
-    found = look(frames, clip.cuts, touched)
+    found = look(frames, clip.cuts, result.scene.contact is not None)
     tracks = Tracks(
         clip.times, found.tip, found.object, found.tip_sure, found.object_sure,
         min(height, width), tuple(clip.cuts), arm.enters, seen.unmoved,
@@ -218,7 +217,7 @@ def follow(result: Prepared, choices: Choices) -> Motion:
         f"{FPS} a second, by the time stamps."
     )
     motion = lay(tracks, result.scene, choices.mirror)
-    if touched and not choices.object:
+    if result.scene.contact is not None and not choices.object:
         touch, there = motion.times[[motion.contact, motion.arrival]]
         result.warnings += unlike(frames, tracks, touch, there)
     return motion
