@@ -71,6 +71,18 @@ def test_the_page_says_what_to_do_and_asks_nobody_for_anything(tmp_path, capsys)
     assert not re.search(r"\{(task|what|orange|size|outlines|name)\}", text)
 
 
+@pytest.mark.parametrize(
+    ("like", "says"),
+    [("push", "to the dashed outline as the task has it"), ("reach", "bottle cap")],
+)
+def test_a_new_task_has_a_page_as_well(like, says, monkeypatch):
+    bare = tasks.bare
+    monkeypatch.setattr(tasks, "bare", lambda name, **more: bare(like, **more))
+    text = page("domino")
+    assert says in text and "Film your arm: domino" in text
+    assert ('class="goal"' in text) == (like == "push")
+
+
 @pytest.mark.skipif(not browser.CHROMIUM, reason="needs Chromium")
 def test_a_browser_records_what_its_camera_sees(tmp_path):
     """A file stands in for the camera: a white square that goes right, 640 x 360. The stage has the

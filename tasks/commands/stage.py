@@ -15,7 +15,7 @@ import numpy as np
 
 import tasks
 from tasks.commands import Parser, make_folder
-from tasks.commands.stage_page import ORANGE, PAGE, WHAT_TO_DO
+from tasks.commands.stage_page import ANY_TASK, ORANGE, PAGE, WHAT_TO_DO
 from tasks.world import TaskEnv
 from tasks.world.scene import SIZE
 
@@ -44,16 +44,16 @@ def page(task: str) -> str:
     """The page of a task as HTML."""
     env = tasks.bare(task, embodiment="human", observation="state")
     env.reset(seed=0)
-    drawn = outlines(env)
+    drawn, touched = outlines(env), env.scene().contact is not None
     target, start = (env.world.pixel(x) for x in (env.target_position(), env.object_position()))
-    if task != "reach":  # where nothing is moved but the arm
+    if touched:
         x, y = target - start
         drawn["goal"] = [[(a + x, b + y) for a, b in polygon] for polygon in drawn["object"]]
     env.close()
     paths = (f'<path class="{name}" d="{_path(polygons)}"/>' for name, polygons in drawn.items())
     return (
         PAGE.replace("{task}", task)
-        .replace("{what}", WHAT_TO_DO[task])
+        .replace("{what}", WHAT_TO_DO.get(task, ANY_TASK[touched]))
         .replace("{orange}", ORANGE["goal" in drawn])
         .replace("{size}", str(SIZE))
         .replace("{outlines}", "\n".join(paths))

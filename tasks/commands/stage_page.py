@@ -19,6 +19,12 @@ solid orange outline. {START} Push the front with the finger tips until it is wh
 outline begins. Stay there for a moment.""",
 }
 
+ANY_TASK = {  # of a new one: whether an object has to get somewhere -> what to do
+    False: WHAT_TO_DO["reach"],
+    True: f"""Put something of the object's size where the solid orange outline is. {START} Bring it
+to the dashed outline as the task has it. Stay there for a moment.""",
+}
+
 ORANGE = {  # whether a goal is drawn -> what is orange
     False: "the thing to reach",
     True: "the object, and dashed the place it has to get to",
