@@ -608,6 +608,20 @@ def test_a_tip_that_is_seen_past_the_object_before_the_touch_is_laid_behind_it(s
     assert laid[10, 0] == pytest.approx(scene.start[0] - scene.contact)
 
 
+@pytest.mark.parametrize(("scene", "above"), [(SCENE, 0.03), (HIT, 0.02)], ids=["push", "hit"])
+def test_a_run_up_comes_down_to_its_object_by_half_of_its_way(scene, above):
+    """The hand is 4 cm behind the object and 3 cm above its middle: a fast one would hit the top.
+
+    The touch is seen when a fifth of the way is gone."""
+    way = np.clip((np.arange(40) - 19) / 10, 0, 1)
+    x = np.full((40, 2), (0.4, 0.05))
+    x[15] += -0.04 - 0.2 * (scene.goal[0] - scene.start[0]), 0.03
+    laid, _ = retarget._push(x, way, scene, [])
+    assert laid[15] == pytest.approx(
+        (scene.start[0] - scene.contact - 0.04, scene.height + above), abs=1e-9
+    )
+
+
 def test_a_hand_that_is_a_little_out_of_the_box_is_laid_at_its_edge():
     """It begins 1.5 cm above the box, which is no reason to leave its beginning out."""
     t = np.arange(0, 2.6, 1 / 30)

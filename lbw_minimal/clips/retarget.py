@@ -49,6 +49,7 @@ STEEP = 1.0  # height over width of the way; steeper, and it is not seen from th
 # side had up to 1.1, painted ones from the front or from straight above 2.6 and more.
 STEEP_HAND = 1.5
 CARRIED = 0.85  # of its way: a hand that goes along so far has not hit
+STEEPEST = 0.5  # height over way, by which a hit comes down to its object
 OUTSIDE = 0.02  # m out of the tip's box; until then the approach stands in for the clip
 TOO_FAST = 1.5  # times what it may ask for: slowed down by more is worth a warning
 HURRY = 0.8  # of the arm's top speed that a motion may ask for: the rest is for corrections
@@ -194,6 +195,9 @@ def _push(x, way, scene, warnings):
     i, j = int(np.argmax(way >= CONTACT)), int(np.argmax(way >= ARRIVED))
     x = x + (behind[i], scene.height) - x[i]
     if scene.hit:
+        # A run-up comes down behind the object: a tip from above would slide over it.
+        gap = np.maximum(0, behind[:i] - x[:i, 0])
+        x[:i, 1] = np.minimum(x[:i, 1], scene.height + STEEPEST * gap)
         # Until the object is fastest the hand drives it, whatever is seen of a hand so fast.
         k = i + int(np.argmax(np.diff(behind[i:])))
         x[i:k, 0] = behind[i:k]
