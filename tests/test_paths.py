@@ -8,8 +8,8 @@ import pytest
 from lbw_minimal.clips.paths import (
     Tracks,
     Unusable,
+    busiest_piece,
     ends,
-    longest_piece,
     low_pass,
     median3,
     progress,
@@ -42,19 +42,19 @@ def test_the_piece_is_taken_in_which_most_happens_to_what_matters():
     thing = np.concatenate([np.full(20, 70.0), np.linspace(20, 50, 20)])
     cut = tracks(tip, thing, cuts=(20,))
     warnings = []
-    assert longest_piece(cut, True, warnings).times[0] == 20 / 25
+    assert busiest_piece(cut, True, warnings).times[0] == 20 / 25
     assert warnings == ["The clip jumps once, at 0.8 s: only the piece from 0.8 to 1.6 s is used."]
-    assert longest_piece(cut, False, []).times[-1] == 19 / 25
+    assert busiest_piece(cut, False, []).times[-1] == 19 / 25
 
 
 def test_all_jumps_of_a_clip_are_said():
     tip = np.concatenate([np.linspace(0, 9, 10), np.linspace(50, 90, 10), np.linspace(0, 9, 10)])
     for cuts, wanted in (((10, 20), "twice, at 1.0 and 2.0 s"), ((), None)):
         warnings = []
-        longest_piece(tracks(tip, cuts=cuts, rate=10), True, warnings)
+        busiest_piece(tracks(tip, cuts=cuts, rate=10), True, warnings)
         assert not (warnings or wanted) or wanted in warnings[0]
     tip, warnings = np.repeat([0.0, 50, 0, 50], 10) + np.arange(40), []
-    longest_piece(tracks(tip, cuts=(10, 20, 30), rate=10), True, warnings)
+    busiest_piece(tracks(tip, cuts=(10, 20, 30), rate=10), True, warnings)
     assert "3 times, at 1.0, 2.0 and 3.0 s" in warnings[0]
 
 
@@ -95,7 +95,7 @@ def test_a_piece_is_that_in_which_the_hand_or_what_it_touched_is_seen(touched, f
     sure[:5], sure[10:12], sure[-4:] = 0.4, 0.4, 0.4
     t = np.arange(30)
     hit = np.where((t >= 3) & (t < 28), 1.0, 0.4)  # it is there before, and goes on by itself
-    piece = longest_piece(replace(tracks(np.arange(30), sure=sure), object_sure=hit), touched, [])
+    piece = busiest_piece(replace(tracks(np.arange(30), sure=sure), object_sure=hit), touched, [])
     assert (piece.times[0], piece.times[-1]) == (first / 25, last / 25)
 
 
@@ -103,15 +103,15 @@ def test_a_piece_is_that_in_which_the_hand_or_what_it_touched_is_seen(touched, f
 def test_a_change_of_the_picture_is_a_cut_where_something_jumps_by_a_25th_of_the_side(jump, is_cut):
     tip = np.concatenate([np.full(10, 30.0), np.full(10, 30.0 + jump)])
     notes = []
-    longest_piece(tracks(tip, cuts=(10,)), False, notes)
+    busiest_piece(tracks(tip, cuts=(10,)), False, notes)
     assert bool(notes) == is_cut
 
 
 def test_what_goes_on_as_fast_as_before_and_after_is_no_cut():
     notes = []
-    longest_piece(tracks(6.0 * np.arange(20), cuts=(10,)), False, notes)
+    busiest_piece(tracks(6.0 * np.arange(20), cuts=(10,)), False, notes)
     assert not notes
-    longest_piece(
+    busiest_piece(
         tracks(np.r_[6.0 * np.arange(10), 6.0 * np.arange(10) + 70], cuts=(10,)), False, notes
     )
     assert notes
@@ -121,7 +121,7 @@ def test_what_goes_on_as_fast_as_before_and_after_is_no_cut():
 def test_a_jump_is_twice_as_far_as_the_steps_about_it(jump, is_cut):
     notes, x = [], 6.0 * np.arange(20)
     x[10:] += jump - 6
-    longest_piece(tracks(x, cuts=(10,)), False, notes)
+    busiest_piece(tracks(x, cuts=(10,)), False, notes)
     assert bool(notes) == is_cut
 
 
@@ -131,7 +131,7 @@ def test_the_steps_about_a_jump_are_the_one_before_and_the_one_after():
         steps, notes = np.full(19, 12.0), []
         steps[8:11] = 5, jump, 5
         x = np.r_[0, np.cumsum(steps)]
-        longest_piece(tracks(x, cuts=(10,)), False, notes)
+        busiest_piece(tracks(x, cuts=(10,)), False, notes)
         assert bool(notes) == is_cut
 
 
@@ -140,7 +140,7 @@ def test_a_change_of_the_picture_is_a_cut_where_the_hand_is_not_seen():
     for unseen, is_cut in ((9, True), (10, True), (8, False), (11, False)):
         sure, notes = np.ones(20), []
         sure[unseen] = 0.4
-        longest_piece(tracks(np.arange(20.0), sure=sure, cuts=(10,)), False, notes)
+        busiest_piece(tracks(np.arange(20.0), sure=sure, cuts=(10,)), False, notes)
         assert bool(notes) == is_cut
 
 

@@ -142,7 +142,7 @@ def of_a_hand(tracks: Tracks, notes: list[str]) -> Tracks:
     return replace(tracks, tip=tracks.object, tip_sure=tracks.object_sure)
 
 
-def longest_piece(tracks: Tracks, touched: bool, warnings: list[str]) -> Tracks:
+def busiest_piece(tracks: Tracks, touched: bool, warnings: list[str]) -> Tracks:
     """The piece between cuts in which most happens, from where hand or object is first seen to
     where one of them is last seen. Where nothing is touched, the hand alone counts.
 

@@ -22,10 +22,10 @@ from lbw_minimal.clips.paths import (
     STANDS,
     Tracks,
     Unusable,
+    busiest_piece,
     check_tip,
     ends,
     interpolate,
-    longest_piece,
     low_pass,
     never_moves,
     of_a_hand,
@@ -99,7 +99,7 @@ def lay(tracks: Tracks, scene: Scene, mirror: bool | None = None) -> Motion:
     touched = scene.contact is not None
     if not touched:
         tracks = of_a_hand(tracks, notes)
-    whole, tracks = tracks, longest_piece(tracks, touched, warnings)
+    whole, tracks = tracks, busiest_piece(tracks, touched, warnings)
     t = np.arange(tracks.times[0], tracks.times[-1] + 1e-9, 1 / FPS)
     tip = thing = low_pass(*trusted(tracks, "tip"), t)  # (N, 2) pixels
     if touched:
