@@ -1,10 +1,12 @@
 """Whether an object is pushed, by hand: a way of 100 pixels, touched at step 20, done at 40."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from lbw_minimal.clips.paths import Tracks, Unusable
-from lbw_minimal.clips.pushing import check_hand, check_steps, check_way, gets_faster
+from lbw_minimal.clips.pushing import check_door, check_hand, check_steps, check_way, gets_faster
 
 TOUCH, THERE, N = 20, 40, 50
 WAY = np.clip((np.arange(N) - TOUCH) / (THERE - TOUCH), 0, 1)
@@ -36,6 +38,23 @@ def test_an_object_that_comes_towards_the_edge_of_the_arm_is_pulled(along, enter
             pushed((along, 0), COMES, enters=enters)
     else:
         pushed((along, 0), COMES, enters=enters)
+
+
+@pytest.mark.parametrize(
+    ("door", "along", "pulls"),
+    [(173, 50, True), (171, 50, False), (173, -50, False), (27, -50, True), (29, -50, False),
+     (27, 50, False), (np.nan, 50, False)],
+)  # fmt: skip
+def test_an_arm_that_comes_in_ahead_of_its_hand_pulls(door, along, pulls):
+    """By an eighth of the width: 72 pixels of 600, of a hand at 100."""
+    none = np.zeros(0)
+    seen = Tracks(none, none, none, none, none, 400, enters=door / 600, width=600)
+    check_door(replace(seen, width=0), 100, along)  # unknown
+    if pulls:
+        with pytest.raises(Unusable, match="which so pulls it"):
+            check_door(seen, 100, along)
+    else:
+        check_door(seen, 100, along)
 
 
 @pytest.mark.parametrize(

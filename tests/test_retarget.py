@@ -378,6 +378,11 @@ def drawn_to_the_arm():
     return replace(clip(), enters=0.8), "which so pulls it"
 
 
+def hooked():
+    """A hand that is behind the object, of an arm that comes from above and ahead of it."""
+    return replace(clip(), enters=0.74, width=1000), "which so pulls it"
+
+
 def broken_off():
     """27 pixels from its start, which are less than a tenth of the picture."""
     return clip(last=1.4), "while the object still gets faster"
@@ -407,7 +412,7 @@ def lifted():
 
 NOT_USABLE = (nothing_is_pushed, no_hand, an_unseen_hand_that_pushes, a_hidden_object,
               too_few_frames, short_pieces, from_above,
-              pulled, held_from_the_front, hidden_by_the_arm, drawn_to_the_arm,
+              pulled, held_from_the_front, hidden_by_the_arm, drawn_to_the_arm, hooked,
               the_hand_taken_for_the_object, broken_off, lifted,
               lifted_by_a_hand_in_front, nothing_stands_elsewhere_in_the_end)  # fmt: skip
 

@@ -54,6 +54,7 @@ class Tracks:
     unmoved: bool = False  # whether the last frames look as the first ones, but for the arm
     # what the user placed: "tip" or "object", and from when to when, in s
     yours: tuple[tuple[str, float, float], ...] = ()
+    width: int = 0  # pixels, of the frames; 0 if unknown
 
     def part(self, first: int, last: int) -> Tracks:
         """Frames `first` to `last` - 1."""

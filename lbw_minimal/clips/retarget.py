@@ -33,7 +33,7 @@ from lbw_minimal.clips.paths import (
     trusted,
     unsure,
 )
-from lbw_minimal.clips.pushing import check_hand, check_steps, check_way, gets_faster
+from lbw_minimal.clips.pushing import check_door, check_hand, check_steps, check_way, gets_faster
 
 FPS = 25  # steps a second of the motion, as in the tasks
 CONTACT = 0.12  # of the object's way: by then it is pushed, whatever the tip's pixels say
@@ -128,6 +128,7 @@ def lay(tracks: Tracks, scene: Scene, mirror: bool | None = None) -> Motion:
     i, j = (int(np.argmax(way >= share)) for share in (CONTACT if touched else ARRIVED, ARRIVED))
     if touched:
         check_way(tip, thing, way, (i, j), (start, end), tracks.enters)
+        check_door(tracks, tip[i, 0], end[0] - start[0])
         check_hand(tracks, t[i : j + 1], thing[i : j + 1], end - start)
         if not scene.hit:  # a hit thing may go far while it is a blur
             check_steps(seen, start, end)

@@ -199,7 +199,7 @@ def follow(result: Prepared, choices: Choices) -> Motion:
     found = look(frames, clip.cuts, result.scene.contact is not None)
     tracks = Tracks(
         clip.times, found.tip, found.object, found.tip_sure, found.object_sure,
-        min(height, width), tuple(clip.cuts), arm.enters, seen.unmoved,
+        min(height, width), tuple(clip.cuts), arm.enters, seen.unmoved, width=width,
     )  # fmt: skip
     tracks = tracks.marked("tip", list(choices.tip)).marked("object", list(choices.object))
     result.tracks, result.notes = tracks, result.notes + [choices.placed] * bool(choices.placed)
