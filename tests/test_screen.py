@@ -31,6 +31,11 @@ def test_coding_changes_a_colour_by_a_grey_level_and_noise_by_more():
     assert recorded(page(0.6, 246 + rng.integers(0, 9, (60, 100, 3)))) is None
 
 
+@pytest.mark.parametrize(("level", "screen"), [(16, True), (15, False), (0, False)])
+def test_a_dark_room_is_no_screen(level, screen):
+    assert (recorded(page(0.6, level)) is not None) == screen
+
+
 def unusable(result, choices):
     result.warnings.append("The camera trembles.")
     raise Unusable("the camera moves", "put it on a stand")

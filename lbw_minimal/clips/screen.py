@@ -16,6 +16,7 @@ from lbw_minimal.clips.paths import Unusable
 # 0.37, in recordings of pages and editors 0.54 to 0.71.
 FILLS = 0.5
 NEAR = 1  # grey levels by which coding changes a colour
+BLACK = 16  # of 255: a dark room is as black before a camera
 
 
 def recorded(frames: np.ndarray) -> Unusable | None:
@@ -30,8 +31,10 @@ def recorded(frames: np.ndarray) -> Unusable | None:
 
 
 def _commonest(frame):
-    """The share of a frame (H, W, 3) that its commonest colour fills."""
+    """The share of a frame (H, W, 3) that its commonest colour fills; 0 if that is black."""
     numbers = frame @ np.array([1 << 16, 1 << 8, 1])  # (H, W), one for each colour
     _, where, counts = np.unique(numbers, return_index=True, return_counts=True)
     colour = frame.reshape(-1, 3)[where[counts.argmax()]].astype(int)
+    if colour.max() < BLACK:
+        return 0.0
     return (np.abs(frame - colour).max(axis=-1) <= NEAR).mean()
