@@ -230,6 +230,8 @@ def test_a_perception_learns_and_sees_what_it_did(tmp_path, golden):
     run = Run(tmp_path)
     P = learn_perception(human, still, robot, TINY, task="push", seed=3, run=run)
     P.watch(human)
+    # No golden figures: a grey level, rounded otherwise by another processor, moves them by 0.015.
+    np.testing.assert_array_equal(P.z_E, P.detect(P.translated))
     logs = {name: json.loads((tmp_path / f"{name}.json").read_text()) for name in LOGS}
     golden(
         {
@@ -238,7 +240,6 @@ def test_a_perception_learns_and_sees_what_it_did(tmp_path, golden):
             "rows": [str(sorted(row)) for rows in logs.values() for row in rows],
             "style": P.style,
             "translated": P.translated.astype(float).mean((1, 2)).round(1),
-            "seen": P.z_E[:, :, 0],
             "robot": P.detect(robot)[:3, 1],
         },
         rtol=2e-2,  # of whole grey levels
