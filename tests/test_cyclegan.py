@@ -335,7 +335,7 @@ def test_short_training_halves_the_cycle_loss_and_takes_on_the_robots_colours(mo
     for name in ("L_cyc^x", "L_cyc^y"):
         assert log[-1][name] < 0.5 * log[0][name]
     made = cyclegan.translate(model, human)
-    # The robot's wall is 100, the human's 150. Four seeds and three processors make 84 to 109 of it.
+    # The robot's wall is 100, the human's 150: four seeds on three processors make it 84 to 109.
     assert np.abs(np.median(made, (0, 1, 2)) - 100).max() < 25
 
 
