@@ -204,23 +204,37 @@ def test_no_capability_and_no_new_privilege_is_left(monkeypatch):
     assert (rights, status["NoNewPrivs"], status["Seccomp"]) == ([0] * 4, "1", "2")
 
 
+def under(pid):
+    """The processes that a process has started, and theirs; inside bubblewrap they have others."""
+    try:
+        tasks = list(Path(f"/proc/{pid}/task").iterdir())
+        children = {int(c) for task in tasks for c in (task / "children").read_text().split()}
+    except OSError:  # it has ended meanwhile
+        return set()
+    return children.union(*map(under, children))
+
+
 def test_a_process_ends_with_its_exercise_and_its_worker_stays(box):
-    worker = box.process.pid
-    pid = ask(box, STAYS)
+    box.close()  # of the test before
+    worker, before = box.process.pid, under(box.process.pid)
+    ask(box, STAYS)
+    students = under(worker) - before
     began = time.monotonic()
     box.close()
     assert time.monotonic() - began < sandbox.LEAVING
-    assert not sandbox.bubblewrap()[0] and not Path(f"/proc/{pid}").exists()
-    assert box.process.pid == worker
+    assert students and not any(Path(f"/proc/{pid}").exists() for pid in students)
+    assert box.process.pid == worker and under(worker) == before
 
 
 def test_a_worker_takes_what_it_has_forked_along(box):
-    pid = ask(box, STAYS)
+    ask(box, STAYS)
+    forked = under(box.process.pid)
+    assert forked
     box.kill()
     deadline = time.monotonic() + 10
-    while Path(f"/proc/{pid}").exists() and time.monotonic() < deadline:
+    while any(Path(f"/proc/{pid}").exists() for pid in forked) and time.monotonic() < deadline:
         time.sleep(0.05)
-    assert not Path(f"/proc/{pid}").exists() or sandbox.bubblewrap()[0]
+    assert not any(Path(f"/proc/{pid}").exists() for pid in forked)
 
 
 # What the judge takes
