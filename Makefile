@@ -5,8 +5,7 @@ BIN = $(VENV)/bin
 PROMISED = import sys; sys.exit(not (3, 11) <= sys.version_info[:2] <= (3, 13))
 PYTHON ?= $(shell for p in python3 python3.11 python3.12 python3.13 python; do \
     $$p -c '$(PROMISED)' 2>/dev/null && echo $$p && break; done)
-# The exact set that the kit's policies were trained with; `make push LOCK=` takes the newest
-# releases instead.
+# The exact set that the kit's tests run with; `make push LOCK=` takes the newest releases instead.
 LOCK ?= -c requirements-lock.txt
 # An index of PyTorch's CPU builds, see README; without one pip takes what it takes by default. It
 # gives torch alone, since it need not have the lock's versions of what torch depends on.

@@ -84,6 +84,24 @@ def test_a_new_task_has_a_page_as_well(like, says, monkeypatch):
 
 
 @pytest.mark.skipif(not browser.CHROMIUM, reason="needs Chromium")
+def test_on_a_phone_the_command_breaks_before_the_path_alone(tmp_path):
+    """It broke between -m and tasks."""
+    (tmp_path / "coffee.html").write_text(page("coffee"), encoding="utf-8")
+    small = {"width": 390, "height": 900, "deviceScaleFactor": 1, "mobile": True}
+
+    async def looked():
+        async with browser.opened(tmp_path / "coffee.html", tmp_path / "profile") as shown:
+            await shown.call("Emulation.setDeviceMetricsOverride", **small)
+            await shown.js("document.getElementById('clip').textContent = 'coffee-clip.webm'")
+            heights = "[...document.querySelectorAll('pre > span')].map(e => e.offsetHeight)"
+            wide = "document.documentElement.scrollWidth"
+            return await shown.js(heights), await shown.js(wide)
+
+    (command, path), wide = asyncio.run(looked())
+    assert 0 < command == path < 40 and wide <= 390
+
+
+@pytest.mark.skipif(not browser.CHROMIUM, reason="needs Chromium")
 def test_a_browser_records_what_its_camera_sees(tmp_path):
     """A file stands in for the camera: a white square that goes right, 640 x 360. The stage has the
     camera's shape, so that no outline lies beside the picture."""
@@ -120,7 +138,7 @@ def test_a_browser_records_what_its_camera_sees(tmp_path):
             await shown.until(state, "recorded")
             name = await shown.js("document.getElementById('save').download")
             assert await shown.js("document.getElementById('clip').textContent") == name
-            command = "document.getElementById('clip').parentElement.textContent"
+            command = "document.querySelector('pre').textContent"
             assert await shown.js(command) == f"python -m tasks prepare push PATH/TO/{name}"
             return name, base64.b64decode((await shown.js(read)).split(",", 1)[1])
 

@@ -62,7 +62,8 @@ button, .bar a { font: inherit; padding: .55rem 1.1rem; border: 1px solid var(--
 button:disabled { opacity: .45 }
 #record { background: #b3261e; color: #fff; border-color: #b3261e }
 #told { min-height: 1.5em }
-code { background: var(--panel); padding: .1rem .3rem; border-radius: 4px }
+pre { white-space: pre-wrap; background: var(--panel); border-radius: 8px; padding: .7rem .9rem }
+pre > span { display: inline-block; max-width: 100%; overflow-wrap: anywhere }
 [hidden] { display: none !important }
 </style>
 </head>
@@ -93,15 +94,17 @@ code { background: var(--panel); padding: .1rem .3rem; border-radius: 4px }
 <input id="file" type="file" accept="video/*" capture="environment"></label></p>
 <ul>
 <li>Camera: to the side of the table, a little above it, and still. Lean it against something.</li>
-<li>Arm: from the left, or from above as it is drawn; bare or in a sleeve, with nothing else that
-moves in the picture.</li>
-<li>The outline is a help. A clip need not fit it exactly, but object and goal have to be in the
+<li>Arm: one, from the left, or from above as it is drawn; bare or in a sleeve, with nothing else
+that moves in the picture.</li>
+<li>Light: from the front, and enough of it. Hand, sleeve and object differ in colour from what is
+behind them.</li>
+<li>The outline is a help. A clip need not fit it exactly, but all of the way has to be in the
 picture.</li>
 <li>Nothing leaves this machine: the page has no way to send anything.</li>
 </ul>
 <p>Then, in a terminal in the kit's folder, with the path to the saved film, which most browsers put
-into Downloads: <code>python -m tasks prepare {task} PATH/TO/<span id="clip">CLIP</span></code>.
-From a phone the film has to get to the computer first.</p>
+into Downloads; from a phone the film has to get to the computer first:</p>
+<pre><span>python -m tasks prepare {task}</span> <span>PATH/TO/<span id="clip">CLIP</span></span></pre>
 </main>
 <script>
 "use strict";
