@@ -1,36 +1,67 @@
 """The gallery: one page and two scenes a task, which need nothing but each other."""
 
 import re
+import subprocess
 from types import SimpleNamespace
 
+import browser
 import cv2
 import numpy as np
+import pytest
 from PIL import Image
 
 import tasks
 from tasks.commands import gallery, own_arm
 
 
-def test_the_page_shows_a_task_with_its_two_scenes(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(tasks, "TASKS", ("domino", "reach"))  # one that nobody has trained yet
-    monkeypatch.setattr(own_arm, "prepared", lambda: SimpleNamespace(done=True))
-    monkeypatch.setattr(own_arm, "section", lambda clip: "")
-    monkeypatch.setattr(own_arm, "strip", lambda clip: b"six moments")
-    page = gallery.write(tmp_path).read_text()
-    assert capsys.readouterr().out.splitlines() == [
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """A gallery of two tasks, one of which nobody has trained yet, and a clip."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(tasks, "TASKS", ("domino", "reach"))
+        patch.setattr(own_arm, "prepared", lambda: SimpleNamespace(done=True))
+        patch.setattr(own_arm, "section", lambda clip: "")
+        patch.setattr(own_arm, "strip", lambda clip: b"six moments")
+        said = []
+        patch.setattr("builtins.print", lambda text, **how: said.append(text))
+        page = gallery.write(tmp_path_factory.mktemp("gallery"))
+    assert said == [
         f"domino: left out, for it has no weights in {tasks.WEIGHTS / 'domino'}", "reach: done",
     ]  # fmt: skip
+    return page.parent
+
+
+def test_the_page_shows_a_task_with_its_two_scenes(folder):
+    page = (folder / "index.html").read_text()
     scenes = re.findall(r'<iframe[^>]* src="([^"]+)"', page)
     assert scenes == ["reach-human.html", "reach-robot.html"]
     for name in scenes:
-        scene = (tmp_path / name).read_text()
+        scene = (folder / name).read_text()
         assert "MeshCat.Viewer" in scene and len(scene) < 2e6
     assert page.count("<figure>") == 8 + 2  # frames of the demonstration, two scenes
     assert page.count("<video") == 1
-    assert (tmp_path / "lookalike.png").read_bytes() == b"six moments"
+    assert (folder / "lookalike.png").read_bytes() == b"six moments"
     assert page.count('<img class="still" alt="reach, ') == 2  # what is printed of the scenes
-    assert str(tmp_path) not in page and str(tasks.ROOT) not in page
+    assert str(folder) not in page and str(tasks.ROOT) not in page
     assert not re.search(r'(?:src|href)="(?!data:|reach-)', page)
+
+
+@pytest.mark.skipif(not browser.CHROMIUM, reason="needs Chromium")
+@pytest.mark.parametrize(("copies", "sheets"), [(2, 1), (3, 2)])
+def test_two_tasks_are_printed_on_a_sheet(copies, sheets, folder, tmp_path):
+    """It was one a sheet, with most of it white."""
+    page = re.sub(
+        "<section>.*</section>",
+        lambda found: found[0] * copies,
+        (folder / "index.html").read_text(),
+        flags=re.DOTALL,
+    )
+    (tmp_path / "page.html").write_text(page)
+    line = [browser.CHROMIUM, "--headless", "--no-sandbox", f"--user-data-dir={tmp_path}/profile",
+            f"--print-to-pdf={tmp_path}/page.pdf", "--no-pdf-header-footer"]  # fmt: skip
+    url = (tmp_path / "page.html").as_uri()
+    subprocess.run([*line, url], capture_output=True, check=True, timeout=120)
+    assert len(re.findall(rb"/Type\s*/Page\b", (tmp_path / "page.pdf").read_bytes())) == sheets
 
 
 def test_a_clip_of_ones_own_is_shown_and_called_a_look_alike():

@@ -37,7 +37,10 @@ PAIR = """
 .pair figure { margin: 0 }
 .pair iframe, .pair img { width: 100%; height: 17rem; object-fit: cover }
 @media (max-width: 40rem) { .pair { grid-template-columns: 1fr } }
-@media print { .pair { grid-template-columns: repeat(2, 1fr) } .pair img { height: 9rem } }
+@media print { .pair { grid-template-columns: repeat(2, 1fr) } .pair img { height: 7rem }
+               .film { display: none } section { break-inside: avoid }
+               h2 { font-size: 1.05rem; margin-top: .5rem; padding-top: .4rem }
+               .strip { margin: .4rem 0 } }
 """
 HEAD = """
 <h1>The five tasks</h1>
