@@ -59,25 +59,34 @@ def test_all_jumps_of_a_clip_are_said():
 
 
 @pytest.mark.parametrize(
-    ("lost", "said"),
+    ("lost", "spans"),
     [
         ([(8, 13)], []),  # 0.5 s, and not longer
-        ([(8, 14)], ["The tip was not surely found from 0.8 to 1.4 s: look at these pictures."]),
-        ([(0, 8), (20, 30)], [
-            "The tip was not surely found from 0.0 to 0.8 s: look at these pictures, if the hand "
-            "is in them.",
-            "The tip was not surely found from 2.0 to 2.6 s: look at these pictures.",
-        ]),
+        ([(8, 14)], ["0.8 to 1.4"]),
+        ([(0, 8), (20, 30)], ["0.0 to 0.8", "2.0 to 2.6"]),
         ([(27, 40)], []),  # after the end
     ],
-)  # fmt: skip
-def test_what_was_not_surely_found_for_longer_than_half_a_second_is_said(lost, said):
+)
+def test_what_was_not_surely_found_for_longer_than_half_a_second_is_said(lost, spans):
     sure = np.ones(40)
     for a, b in lost:
         sure[a:b] = 0.4
     seen = replace(tracks(np.arange(40), rate=10), tip_sure=sure)
-    assert unsure(seen, "tip", 1.0, 2.6) == said
-    assert unsure(seen, "object", 1.0, 2.6) == []
+    said = [f"The tip was not surely found from {s} s: look at these pictures." for s in spans]
+    assert unsure(seen, "tip", 1.0, 1.0, 2.6) == said
+    assert unsure(seen, "object", 1.0, 1.0, 2.6) == []
+
+
+@pytest.mark.parametrize(("touch", "said"), [(1.05, True), (1.15, False)])
+def test_a_hand_that_is_found_well_before_the_touch_may_not_have_come_yet(touch, said):
+    """It is found from 0.8 s on. A thing is there all along, and a hand that is lost again."""
+    sure = np.ones(40)
+    sure[:8] = 0.4
+    seen = replace(tracks(np.arange(40), rate=10), tip_sure=sure, object_sure=sure)
+    assert bool(unsure(seen, "tip", 0.8, touch, 2.6)) == said
+    assert unsure(seen, "object", 0.8, touch, 2.6)
+    later = replace(seen, tip_sure=np.roll(sure, 2))  # it was there, and was lost
+    assert unsure(later, "tip", 0.0, 2.0, 2.6)
 
 
 def test_what_was_not_sure_in_another_piece_is_not_said():
@@ -85,7 +94,7 @@ def test_what_was_not_sure_in_another_piece_is_not_said():
     sure[2:12], sure[20:28] = 0.4, 0.4
     tip = np.where(np.arange(40) < 20, 10.0, 60.0)
     cut = tracks(tip, sure=sure, cuts=(20,), rate=10)
-    (said,) = unsure(cut, "object", 2.8, 3.9)
+    (said,) = unsure(cut, "object", 2.8, 2.8, 3.9)
     assert "from 2.0 to 2.8 s: look at these pictures." in said
 
 

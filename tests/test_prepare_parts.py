@@ -349,6 +349,23 @@ def test_where_nothing_seems_to_move_an_arm_that_is_seen_does(arms, refused, mon
         assert follow(result, marks) == "laid"
 
 
+@pytest.mark.parametrize("light", ["", " The picture is dark: more light would help."])
+def test_a_refused_clip_is_told_what_is_poor_about_its_light(light, monkeypatch):
+    """It is measured once the camera stands, in the shot that is asked."""
+    asked, still = [], ("nothing moves", "record it all")
+    monkeypatch.setattr(prepare, "read_clip", lambda path, **more: clip())
+    monkeypatch.setattr(prepare, "is_own", lambda *what: False)
+    monkeypatch.setattr(prepare, "coming_in", lambda frames, off: NONE)
+    monkeypatch.setattr(
+        prepare.footage,
+        "check",
+        lambda frames, cuts: Footage(frames, [], slice(2, 6), None, True, still),
+    )
+    monkeypatch.setattr(prepare.light, "poor", lambda frames: asked.append(len(frames)) or light)
+    result = prepare.prepare("push", "a.mp4")
+    assert result.why_not == f"nothing moves; record it all.{light}" and asked == [4]
+
+
 def test_84_pixels_are_enough_and_83_are_not(monkeypatch):
     checked = []
     monkeypatch.setattr(

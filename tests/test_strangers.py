@@ -50,7 +50,7 @@ def test_any_kind_is_filmed_or_painted_as_asked():
 
 def test_a_verdict_is_right_if_its_reason_is():
     still = developed(5)
-    assert judged(still, "not usable: nothing moves in the clip; film an arm that does the task.")
+    assert judged(still, "not usable: nothing moves in the clip; record it all.")
     assert not judged(still, "not usable: the camera moves; put it on a stand.")
     assert not judged(still, "usable")
     assert still.kind in FAULTS

@@ -73,7 +73,7 @@ def _still(moves):
     """Why nothing large is among what moves (T, 84, 84), and the remedy."""
     if _speck(moves):
         return "no arm is seen, only something small moves", SIDE_ON
-    return "nothing moves in the clip", "film an arm that does the task"
+    return "nothing moves in the clip", "record from before the hand comes in until all is done"
 
 
 def _steadied(frames, shots, longest):

@@ -21,6 +21,7 @@ FOUND = 0.5  # share of the frames in which the object has to be found
 TIP_FOUND = 0.3
 FADE = 0.5  # s, for which a correction of what was surely found lasts beyond it
 UNSURE = 0.5  # s, longer than a glitch of the detector
+COMING = 0.3  # s before the touch, until which a hand that is not found may not have come yet
 ELSEWHERE = 0.05  # of the frames: in more of them a thing at rest is not surely seen elsewhere
 LEAST_FRAMES = 8  # of a piece: 0.3 s of a phone's, 0.8 s of a slow webcam's
 # Of the picture's shorter side: where a detector is unsure, it errs by less than the first. A hand
@@ -182,20 +183,24 @@ def jumps(tracks: Tracks) -> str:
     return f"The clip jumps {often}, at {at} s"
 
 
-def unsure(tracks: Tracks, name: str, first: float, last: float) -> list[str]:
+def unsure(tracks: Tracks, name: str, first: float, touch: float, last: float) -> list[str]:
     """A sentence for each stretch longer than `UNSURE` seconds in which the tip or the object,
-    `name`, was not surely found, in the piece that is seen at `first` and goes on to `last` (s)."""
+    `name`, was not surely found, in the piece that is seen at `first` and goes on to `last` (s).
+
+    touch: when the object is touched (s). A tip that is found from well before that on may not have
+    been in the picture before.
+    """
     t, sure = tracks.times, getattr(tracks, f"{name}_sure") >= SURE
     start = max([0, *(c for c in _cuts(tracks) if t[c] <= first)])
     stop = int(np.searchsorted(t, last))  # its frame, or the first one after it
     edges = np.flatnonzero(np.diff(sure[start:stop], prepend=True, append=True)) + start
     said = []
     for a, b in zip(edges[::2], np.minimum(edges[1::2], len(t) - 1), strict=True):
-        if t[b] - t[a] > UNSURE:
-            early = ", if the hand is in them" if name == "tip" and a == start else ""
+        coming = name == "tip" and a == start and t[b] <= touch - COMING
+        if t[b] - t[a] > UNSURE and not coming:
             said.append(
                 f"The {name} was not surely found from {t[a]:.1f} to {t[b]:.1f} s: look at these "
-                f"pictures{early}."
+                "pictures."
             )
     return said
 

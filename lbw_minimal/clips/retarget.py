@@ -137,8 +137,8 @@ def lay(tracks: Tracks, scene: Scene, mirror: bool | None = None) -> Motion:
         object_ = None
         x[j:] = x[j]
         _check_reach(x, scene)
-    warnings += unsure(whole, "tip", t[0], t[i if scene.hit else j])
-    warnings += unsure(whole, "object", t[0], t[j]) if touched else []
+    warnings += unsure(whole, "tip", t[0], t[i], t[i if scene.hit else j])
+    warnings += unsure(whole, "object", t[0], t[i], t[j]) if touched else []
     first, last = _first_step(x, i, scene), j + 1 + round(REST * FPS)
     notes += _left_out(t, first, last)
     notes += _rests(x[first : j + 1])

@@ -20,7 +20,7 @@ import numpy as np
 
 import tasks
 from lbw_minimal import imitate, video
-from lbw_minimal.clips import arms, footage, screen
+from lbw_minimal.clips import arms, footage, light, screen
 from lbw_minimal.clips.detector import Detector, Found, refine
 from lbw_minimal.clips.hiding import unlike
 from lbw_minimal.clips.motion import small, told
@@ -65,6 +65,7 @@ class Prepared:
     film: np.ndarray = field(default_factory=no_frames)  # (N, 84, 84, 3), as `--video` reads it
     file: bytes = b""  # the same film as an mp4
     why_not: str = ""  # if the clip is not usable
+    light: str = ""  # what is poor about its light, see `light.poor`
     notes: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
 
@@ -136,7 +137,7 @@ def prepare(name: str, path: Path, choices: Choices | None = None) -> Prepared:
             result.done = reenact(env, result.motion)
         except Unusable as error:
             on_a_screen = None if choices.placed else screen.recorded(clip.frames)
-            result.why_not = str(on_a_screen or error)
+            result.why_not = str(on_a_screen or f"{error}{result.light}")
             if on_a_screen:
                 result.warnings = [*clip.losses]  # no camera trembles there
             elif not result.motion and result.tracks and (said := jumps(result.tracks)):
@@ -193,6 +194,7 @@ def follow(result: Prepared, choices: Choices) -> Motion:
     seen = footage.check(frames, clip.cuts)
     frames = seen.frames
     result.clip, result.warnings = replace(clip, frames=frames), result.warnings + seen.warnings
+    result.light = light.poor(frames[seen.shot])
     arm = coming_in(frames[seen.shot], seen.off)
     if seen.still and arm.seen < arms.SEEN:
         raise Unusable(*seen.still)

@@ -1,0 +1,63 @@
+"""Whether a clip is too dark, or its arm too like what is behind it, for the arm to be found.
+
+In: frames (T, H, W, 3) uint8 of a camera that stands. No clip is refused for this: it says better
+why one that is refused shows no arm, or why the dots are wrong. An arm is taken to be what comes in
+over an edge and is as large as one, if it differs from the room by more than noise does.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from lbw_minimal.clips.arms import COVERS
+from lbw_minimal.clips.footage import at_edge, things
+from lbw_minimal.clips.motion import SMALL, small, some
+
+# Grey levels, the median over a clip. In 42 clips, made ones, the kit's and the authors', it was 52
+# or more; with a quarter of the light, 23, arms and things were lost in one of two.
+DARK = 40
+# Grey levels by which the tenth of an arm that differs most does so. In the same clips it was 40 or
+# more; where arms were faded into the room, to 38 and less, they and their things were lost.
+ALIKE = 30
+FAINT = 5  # grey levels that coding changes
+NOISE = 4.0  # deviations
+MOST = 0.9  # quantile of an arm's pixels: the others may be its shadow
+
+
+def poor(frames: np.ndarray) -> str:
+    """A sentence on what is poor in the light or the colours of frames (T, H, W, 3) uint8, and what
+    helps, with a space before it; "" if nothing is."""
+    bright, differs = measured(frames)
+    if bright < DARK:
+        return f" The picture is dark, {bright:.0f} of 255 grey levels: more light would help."
+    if differs < ALIKE:  # not so if nan
+        return (
+            " What comes in over the edge differs from what is behind it by no more than "
+            f"{differs:.0f} of 255 grey levels: a sleeve or a background of another colour, or "
+            "more light, would help."
+        )
+    return ""
+
+
+def measured(frames: np.ndarray) -> tuple[float, float]:
+    """How bright the frames are, and by how much an arm differs from the room, in grey levels of
+    the colour that differs most; the latter is nan if nothing as large as an arm comes in."""
+    few = np.stack([cv2.GaussianBlur(small(frame), (3, 3), 0) for frame in some(frames)])
+    off = few - np.median(few, axis=0)  # (n, 84, 84, 3)
+    off -= np.median(off, axis=(1, 2), keepdims=True)  # light and exposure may change
+    off = np.abs(off).max(axis=-1)  # (n, 84, 84)
+    noise = 1.4826 * np.median(off, axis=(1, 2))
+    arms = [_arm(one, max(FAINT, NOISE * n)) for one, n in zip(off, noise, strict=True)]
+    differs = [np.quantile(arm, MOST) for arm in arms if len(arm)]
+    return float(np.median(few)), float(np.median(differs)) if differs else np.nan
+
+
+def _arm(off, least):
+    """By how much the pixels (n,) of the largest thing that comes in over an edge are off the room,
+    off (84, 84); none if that is smaller than an arm."""
+    labels, stats = things(off > least)
+    area = [area if at_edge(*box) else 0 for *box, area in stats.tolist()]
+    if max(area, default=0) < COVERS * SMALL**2:
+        return off[:0, 0]
+    return off[(labels == 1 + np.argmax(area)) & (off > least)]

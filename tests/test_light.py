@@ -1,0 +1,75 @@
+"""What is said of a clip that is too dark, or whose arm looks like what is behind it."""
+
+import numpy as np
+import pytest
+from toy_clips import room
+
+from lbw_minimal import video
+from lbw_minimal.clips import light
+from tasks import TASKS, VIDEOS
+
+SHARES = np.clip(np.linspace(-0.2, 0.7, 30), 0, 0.55)  # of the width, to which the arm reaches
+
+
+ROOM = room()
+
+
+def film(more, *, room=ROOM, noise=2.0, wide=16):
+    """An arm from the left that is by so much lighter than the room behind it, and as patterned."""
+    frames = np.repeat(room[None].astype(float), len(SHARES), axis=0)
+    for frame, share in zip(frames, SHARES, strict=True):
+        frame[48 : 48 + wide, : round(room.shape[1] * share)] += more
+    noise = np.random.default_rng(0).normal(0, noise, frames.shape)
+    return np.clip(frames + noise, 0, 255).astype(np.uint8)
+
+
+def test_nothing_is_said_of_a_bright_clip_with_an_arm_of_another_colour():
+    assert light.poor(film(60)) == light.poor(film(-60)) == light.poor(film((60, 0, -30))) == ""
+
+
+def test_a_dark_clip_is_called_dark():
+    said = light.poor(film(60) // 5)
+    assert said.startswith(" The picture is dark, 2") and said.endswith("more light would help.")
+
+
+@pytest.mark.parametrize("more", [18, -18, (0, 18, 0)])
+def test_an_arm_like_what_is_behind_it_is_said_with_what_helps(more):
+    said = light.poor(film(more))
+    assert "differs from what is behind it by no more than 1" in said and "sleeve" in said
+
+
+@pytest.mark.parametrize(
+    ("bright", "differs", "said"),
+    [(40, 30, ""), (39.9, 60, "dark"), (40, 29.9, "no more than 30"), (40, np.nan, ""),
+     (39.9, 5, "dark")],
+)  # fmt: skip
+def test_what_counts_as_dark_and_as_alike(bright, differs, said, monkeypatch):
+    monkeypatch.setattr(light, "measured", lambda frames: (bright, differs))
+    assert said in light.poor(None) and bool(said) == bool(light.poor(None))
+
+
+def test_how_bright_and_how_different_is_measured_in_grey_levels():
+    wall = np.full((96, 160, 3), 120, np.uint8)
+    bright, differs = light.measured(film((10, 25, -5), room=wall))
+    assert bright == pytest.approx(120, abs=1) and differs == pytest.approx(25, abs=3)
+
+
+@pytest.mark.parametrize(("rows", "alike"), [(1, True), (5, False)])
+def test_the_tenth_of_an_arm_that_differs_most_counts(rows, alike):
+    """Of sixteen rows of pixels; the others might be its shadow."""
+    more = np.full((16, 1, 1), 12.0)
+    more[:rows] = 80
+    assert bool(light.poor(film(more))) == alike
+
+
+def test_light_that_changes_and_what_is_smaller_than_an_arm_are_no_arm():
+    still = film(0)
+    fades = still * np.linspace(0.9, 1.1, len(still))[:, None, None, None]
+    for frames in (still, np.clip(fades, 0, 255).astype(np.uint8), film(18, wide=4)):
+        assert np.isnan(light.measured(frames)[1]) and light.poor(frames) == ""
+
+
+@pytest.mark.parametrize("name", TASKS)
+def test_nothing_is_said_of_the_kits_own_films(name):
+    frames, _ = video.read(VIDEOS / name / "expert_01.mp4")
+    assert light.poor(frames) == ""
