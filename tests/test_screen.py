@@ -31,6 +31,41 @@ def test_coding_changes_a_colour_by_a_grey_level_and_noise_by_more():
     assert recorded(page(0.6, 246 + rng.integers(0, 9, (60, 100, 3)))) is None
 
 
+def desktop(flat=1.0, *, size=30, white=240, stays=False):
+    """A window (10, 100, 100, 3) that is dragged over a wallpaper of many colours; its upper part,
+    a share of it, has one colour, and the rest a picture."""
+    y, x = np.mgrid[:100, :100]
+    wallpaper = np.stack([x, y, (x + y) // 2], -1).astype(np.uint8)
+    window = wallpaper[50 : 50 + size, ::-1][:, :size] ^ 128
+    window[: round(flat * size)] = white
+    frames = np.repeat(wallpaper[None], 10, 0)
+    for t, frame in enumerate(frames):
+        left = 7 * t * (not stays)
+        frame[10 : 10 + size, left : left + size] = window
+    return frames
+
+
+@pytest.mark.parametrize(
+    ("film", "screen"),
+    [
+        (desktop(), True), (desktop(0.6), True), (desktop(0.2), False),
+        (desktop(white=10), False),  # dark rooms have black shadows
+        (desktop(stays=True), False),
+        (desktop(size=8), True), (desktop(size=4), False),  # 0.0064 of the picture; 0.0016
+    ],
+)  # fmt: skip
+def test_a_window_over_a_wallpaper_is_told_by_the_one_colour_of_what_moves(film, screen):
+    said = recorded(film)
+    assert (said is not None) == screen
+    if screen:
+        assert "% of what moves in the picture; film an arm with a camera" in str(said)
+
+
+def test_noise_gives_what_moves_many_colours():
+    noise = np.random.default_rng(0).normal(0, 3, (10, 100, 100, 3))
+    assert recorded(np.clip(desktop() + noise, 0, 255).astype(np.uint8)) is None
+
+
 @pytest.mark.parametrize(("level", "screen"), [(16, True), (15, False), (0, False)])
 def test_a_dark_room_is_no_screen(level, screen):
     assert (recorded(page(0.6, level)) is not None) == screen
