@@ -336,6 +336,50 @@ def test_what_is_not_done_at_the_end_is_told_by_how_far(monkeypatch):
     assert "film one steady motion from the start to the goal" in f"{told.value} {vars(told.value)}"
 
 
+@pytest.mark.parametrize(
+    ("scene", "steps", "said"),
+    [(HIT, 13, "goes along with the object for 0.5 s"), (HIT, 12, "the motion ends 41 cm"),
+     (SCENE, 13, "the motion ends 41 cm")],
+)  # fmt: skip
+def test_a_hand_that_goes_along_for_more_than_half_a_second_has_not_hit(
+    scene, steps, said, monkeypatch
+):
+    """It is told so if the object does not get there; a push goes along to its end."""
+    states = np.zeros((2, 9))
+    states[-1, 6] = 0.41
+    failed = Recording(0, False, None, states, None, np.array([False, False]))
+    monkeypatch.setattr(module, "_timed_hit", lambda env, motion, notes, warnings: motion)
+    monkeypatch.setattr(module, "_measured_push", lambda env, motion: (0.0, True))
+    monkeypatch.setattr(module, "film", lambda env, seed, actions: (None, None, failed))
+    with pytest.raises(Unusable) as told:
+        reenact(Table(scene), along(0, *range(steps + 1), steps, steps))
+    assert said in str(told.value) and "41 cm from the goal" in str(told.value)
+
+
+def test_a_slow_hand_that_goes_along_with_a_puck_is_told_so():
+    """For six tenths of its way, in a second; in 0.3 s it is a hit."""
+    env = bare("slide", embodiment="human", observation="state")
+    env.reset(seed=0)
+    scene = env.scene()
+    (x, z), way = scene.start, scene.goal[0] - scene.start[0]
+    for seconds in (1.0, 0.3):
+        t = np.arange(0, seconds + 2.6, 1 / 30)
+        gone = 0.6 * np.clip((t - 1) / seconds, 0, 1)
+        glides = 0.4 * (1 - (1 - np.clip((t - 1 - seconds) / 0.8, 0, 1)) ** 2)
+        tip = x - scene.contact + way * gone - 0.05 * np.clip(1 - t, 0, 1)
+        tip, puck = (
+            np.stack([tip, 0 * t + z], 1),
+            np.stack([x + way * (gone + glides), 0 * t + z], 1),
+        )
+        motion = lay(seen((tip, puck), t), scene)
+        if seconds == 0.3:
+            assert reenact(env, motion).recording.success[-1]
+        else:
+            with pytest.raises(Unusable, match=r"goes along .* pushed and not hit: done again, it"):
+                reenact(env, motion)
+    env.close()
+
+
 def test_a_push_that_was_done_on_the_way_and_is_not_at_the_end_failed(monkeypatch):
     """A mug that reached its place and fell over later, however near it lies."""
     end = ended(0.995)

@@ -24,6 +24,9 @@ SWINGS = 12  # of a hit; it takes three to eight
 CLOSE = 0.01  # m from the goal, a fifth of what counts as success
 COAST = 1.6  # s after a hit, in which a puck slides and comes to rest
 SPEEDS = 0.25, 4.0  # times the clip's speed at which a hit may be done
+# s for which a hand may go along with what it hits: with 0.3 s made hits were done again, whatever
+# their way, with 1 s mostly not.
+ALONG = 0.5
 ODD = 1.5  # times: a hit that has to be so much faster or slower is worth a warning
 SLOWER = 1.5  # times as slow is a push done again that failed, as when a mug tips over
 
@@ -48,8 +51,9 @@ def reenact(env: TaskEnv, motion: Motion) -> Reenactment:
     env.reset(seed=0)
     notes: list[str] = []
     warnings: list[str] = []
-    further = 0.0
+    further, along = 0.0, 0.0
     if motion.object is not None and env.scene().hit:
+        along = motion.tip[motion.contact :, 0].argmax() / FPS  # s
         motion = _timed_hit(env, motion, notes, warnings)
     elif motion.object is not None:
         further, done = _measured_push(env, motion)
@@ -66,6 +70,12 @@ def reenact(env: TaskEnv, motion: Motion) -> Reenactment:
     frames, pixels, recording = film(env, 0, commands(env, motion, further))
     if not recording.success[-1]:
         off = 100 * np.linalg.norm(recording.states[-1, 3:6] - recording.states[-1, 6:9])
+        if along > ALONG:
+            raise Unusable(
+                f"the hand goes along with the object for {along:.1f} s, which so is pushed and "
+                f"not hit: done again, it stops {off:.0f} cm from the goal",
+                "give it one quick hit, and let it slide on alone",
+            )
         raise Unusable(
             f"done again in the task's scene, the motion ends {off:.0f} cm from the goal",
             "film one steady motion from the start to the goal",
