@@ -38,6 +38,13 @@ def test_an_arm_like_what_is_behind_it_is_said_with_what_helps(more):
     assert "differs from what is behind it by no more than 1" in said and "sleeve" in said
 
 
+@pytest.mark.parametrize(("found", "said"), [(14, True), (15, False)])
+def test_an_arm_whose_tip_is_found_in_half_of_the_frames_is_told_from_the_room(found, said):
+    sure = np.where(np.arange(len(SHARES)) < found, 0.5, 0.4)
+    assert bool(light.poor(film(18), sure)) == said
+    assert "dark" in light.poor(film(60) // 5, sure)
+
+
 @pytest.mark.parametrize(
     ("bright", "differs", "said"),
     [(40, 30, ""), (39.9, 60, "dark"), (40, 29.9, "no more than 30"), (40, np.nan, ""),

@@ -17,6 +17,10 @@ from tasks.commands.choices import Choices, parser
 from tasks.commands.links import mark
 from tasks.commands.prepare import Prepared, follow
 
+FEW = (
+    "6 frames are too few, even without cuts 8 are needed; film the whole motion in one go, at 10 "
+    "frames a second or more."
+)
 ONE, NONE = Arms(1.0, 0.0, 0.5), Arms(0.0, 0.0, np.nan)  # arms that come in
 
 
@@ -361,9 +365,15 @@ def test_a_refused_clip_is_told_what_is_poor_about_its_light(light, monkeypatch)
         "check",
         lambda frames, cuts: Footage(frames, [], slice(2, 6), None, True, still),
     )
-    monkeypatch.setattr(prepare.light, "poor", lambda frames: asked.append(len(frames)) or light)
+    monkeypatch.setattr(prepare.light, "poor", lambda *what: asked.append(what) or light)
     result = prepare.prepare("push", "a.mp4")
-    assert result.why_not == f"nothing moves; record it all.{light}" and asked == [4]
+    assert result.why_not == f"nothing moves; record it all.{light}"
+    assert [len(frames) for (frames,) in asked] == [4]
+    found = Found(np.zeros((6, 2)), np.zeros((6, 2)), np.arange(6), np.zeros(6))
+    monkeypatch.setattr(prepare, "coming_in", lambda frames, off: ONE)
+    monkeypatch.setattr(prepare, "look", lambda frames, cuts, touched: found)
+    result = prepare.prepare("push", "a.mp4")
+    assert result.why_not == f"{FEW}{light}" and asked[-1][1].tolist() == [2, 3, 4, 5]
 
 
 def test_84_pixels_are_enough_and_83_are_not(monkeypatch):

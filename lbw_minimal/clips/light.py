@@ -13,6 +13,7 @@ import numpy as np
 from lbw_minimal.clips.arms import COVERS
 from lbw_minimal.clips.footage import at_edge, things
 from lbw_minimal.clips.motion import SMALL, small, some
+from lbw_minimal.clips.paths import FOUND, SURE
 
 # Grey levels, the median over a clip. In 42 clips, made ones, the kit's and the authors', it was 52
 # or more; with a quarter of the light, 23, arms and things were lost in one of two.
@@ -25,13 +26,18 @@ NOISE = 4.0  # deviations
 MOST = 0.9  # quantile of an arm's pixels: the others may be its shadow
 
 
-def poor(frames: np.ndarray) -> str:
+def poor(frames: np.ndarray, sure: np.ndarray | None = None) -> str:
     """A sentence on what is poor in the light or the colours of frames (T, H, W, 3) uint8, and what
-    helps, with a space before it; "" if nothing is."""
+    helps, with a space before it; "" if nothing is.
+
+    sure (T,): how surely the tip was found in them, if it was searched. Where it mostly was found,
+    an arm was told from the room.
+    """
     bright, differs = measured(frames)
     if bright < DARK:
         return f" The picture is dark, {bright:.0f} of 255 grey levels: more light would help."
-    if differs < ALIKE:  # not so if nan
+    found = sure is not None and (sure >= SURE).mean() >= FOUND
+    if differs < ALIKE and not found:  # nan is not less
         return (
             " What comes in over the edge differs from what is behind it by no more than "
             f"{differs:.0f} of 255 grey levels: a sleeve or a background of another colour, or "

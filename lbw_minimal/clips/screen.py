@@ -16,7 +16,7 @@ from lbw_minimal.clips.paths import Unusable
 # Of the picture. In 28 usable films of people one colour filled up to 0.41, in the kit's own films
 # 0.37, in recordings of pages and editors 0.54 to 0.71.
 FILLS = 0.5
-# Of what moves. In 46 films of a camera, made by an outsider, the kit's strangers and people, it was
+# Of what moves. In 46 films of a camera, an outsider's, the kit's strangers' and people's, it was
 # 0.14 at most, in the kit's own 0.31. Of windows with text and an icon, dragged over a wallpaper,
 # it was 0.38 to 0.61, and of a window that shows a photograph 0.1, so that is not told.
 MOVES = 0.35

@@ -199,6 +199,7 @@ def follow(result: Prepared, choices: Choices) -> Motion:
     if seen.still and arm.seen < arms.SEEN:
         raise Unusable(*seen.still)
     found = look(frames, clip.cuts, result.scene.contact is not None)
+    result.light = light.poor(frames[seen.shot], found.tip_sure[seen.shot])
     tracks = Tracks(
         clip.times, found.tip, found.object, found.tip_sure, found.object_sure,
         min(height, width), tuple(clip.cuts), arm.enters, seen.unmoved, width=width,
