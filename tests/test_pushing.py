@@ -1,60 +1,48 @@
 """Whether an object is pushed, by hand: a way of 100 pixels, touched at step 20, done at 40."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from lbw_minimal.clips.paths import Tracks, Unusable
-from lbw_minimal.clips.pushing import check_door, check_hand, check_steps, check_way, gets_faster
+from lbw_minimal.clips.pushing import check_apart, check_hand, check_steps, check_way, gets_faster
 
 TOUCH, THERE, N = 20, 40, 50
 WAY = np.clip((np.arange(N) - TOUCH) / (THERE - TOUCH), 0, 1)
 
 
-def pushed(along=(100.0, 0.0), tip=0.0, aside=0.0, enters=np.nan):
-    """Check a way `along`, pixels; tip, aside (N,): how far the tip is ahead of the object, and
-    the object to the right of its straight way, in parts of the way."""
+def tracks(enters=np.nan, width=600):
+    none = np.zeros(0)
+    return Tracks(none, none, none, none, none, 400, enters=enters, width=width)
+
+
+def pushed(along=(100.0, 0.0), tip=0.0, aside=0.0, enters=np.nan, width=600):
+    """Check a way `along`, pixels, from 200 on; tip, aside (N,): how far the tip is ahead of the
+    object, and the object to the right of its straight way, in parts of the way."""
     along = np.array(along)
     thing = np.array([200.0, 100.0]) + WAY[:, None] * along
     thing += np.multiply.outer(np.broadcast_to(aside, N), [-along[1], along[0]])
     hand = thing[0] + (WAY + tip)[:, None] * along
     ends = thing[0].copy(), thing[0] + along
-    check_way(hand, thing, WAY, (TOUCH, THERE), ends, enters)
+    check_way(tracks(enters, width), hand, thing, WAY, (TOUCH, THERE), ends)
 
 
 COMES = -0.1 - 2 * np.clip(1 - np.arange(N) / TOUCH, 0, 1)  # from behind, to a tenth of the way
 
 
 @pytest.mark.parametrize(
-    ("along", "enters", "pulls"),
-    [(-100, 0.24, True), (-100, 0.26, False), (100, 0.24, False),
-     (100, 0.76, True), (100, 0.74, False), (-100, 0.76, False)],
-)  # fmt: skip
-def test_an_object_that_comes_towards_the_edge_of_the_arm_is_pulled(along, enters, pulls):
-    """An arm comes from a side if it comes in over the outer quarter of the picture."""
-    if pulls:
-        with pytest.raises(Unusable, match="which so pulls it"):
-            pushed((along, 0), COMES, enters=enters)
-    else:
-        pushed((along, 0), COMES, enters=enters)
-
-
-@pytest.mark.parametrize(
     ("door", "along", "pulls"),
-    [(173, 50, True), (171, 50, False), (173, -50, False), (27, -50, True), (29, -50, False),
-     (27, 50, False), (np.nan, 50, False)],
+    [(263, 100, True), (261, 100, False), (263, -100, False), (137, -100, True),
+     (139, -100, False), (137, 100, False), (np.nan, 100, False)],
 )  # fmt: skip
 def test_an_arm_that_comes_in_ahead_of_its_hand_pulls(door, along, pulls):
-    """By an eighth of the width: 72 pixels of 600, of a hand at 100."""
-    none = np.zeros(0)
-    seen = Tracks(none, none, none, none, none, 400, enters=door / 600, width=600)
-    check_door(replace(seen, width=0), 100, along)  # unknown
+    """By an eighth of the width: 72 pixels of 600, of a hand that is at 190 or 210 when it touches
+    the object."""
+    pushed((along, 0), COMES, enters=door / 600, width=0)  # unknown
     if pulls:
         with pytest.raises(Unusable, match="which so pulls it"):
-            check_door(seen, 100, along)
+            pushed((along, 0), COMES, enters=door / 600)
     else:
-        check_door(seen, 100, along)
+        pushed((along, 0), COMES, enters=door / 600)
 
 
 @pytest.mark.parametrize(
@@ -66,12 +54,12 @@ def test_what_goes_with_the_hand_from_the_start_and_comes_down_with_it_is_the_ha
     """A hand that comes to an object comes nearer by a quarter of its way; a table, or a camera,
     is not so far out of level."""
     along = 100 * np.array([np.sqrt(1 - down**2), down])
-    tip = -0.1 - nearer / 100 * np.clip(1 - np.arange(N) / TOUCH, 0, 1)
+    apart = (-0.1 - nearer / 100 * np.clip(1 - np.arange(N) / TOUCH, 0, 1))[:, None] * along
     if hand:
         with pytest.raises(Unusable, match="is the hand"):
-            pushed(along, tip)
+            check_apart(apart, along)
     else:
-        pushed(along, tip)
+        check_apart(apart, along)
 
 
 @pytest.mark.parametrize(
@@ -89,7 +77,7 @@ def test_what_leaves_its_straight_way_by_a_fifth_between_touch_and_arrival_is_li
         pushed(tip=COMES, aside=aside)
 
 
-@pytest.mark.parametrize("enters", [0.5, np.nan])
+@pytest.mark.parametrize("enters", [0.3, np.nan])
 @pytest.mark.parametrize(("ahead", "usable"), [(0.24, True), (0.26, False)])
 def test_a_tip_a_quarter_of_the_way_ahead_does_not_push(ahead, usable, enters):
     tip = np.where(np.arange(N) < TOUCH, -0.5, ahead)
@@ -100,10 +88,20 @@ def test_a_tip_a_quarter_of_the_way_ahead_does_not_push(ahead, usable, enters):
             pushed(tip=tip, enters=enters)
 
 
-def test_what_goes_away_from_the_edge_of_the_arm_is_not_pulled_wherever_the_tip_was_seen():
-    pushed(tip=np.full(N, 0.5), enters=0.1)
-    with pytest.raises(Unusable, match="in front of it"):
-        pushed(tip=np.full(N, 0.5), enters=0.5)
+@pytest.mark.parametrize(
+    ("enters", "usable"), [(0.1, True), (0.24, True), (0.26, False), (0.5, False)]
+)
+@pytest.mark.parametrize("way", [100, -100])
+def test_what_goes_away_from_an_arm_at_the_side_is_pushed_wherever_the_tip_was_seen(
+    enters, usable, way
+):
+    """An arm comes from a side if it comes in over the outer quarter of the picture."""
+    told = dict(along=(way, 0), tip=np.full(N, 0.5), enters=enters if way > 0 else 1 - enters)
+    if usable:
+        pushed(**told)
+    else:
+        with pytest.raises(Unusable, match="in front of it"):
+            pushed(**told, width=0)
 
 
 def hand(ahead, sure):

@@ -375,7 +375,7 @@ def hidden_by_the_arm():
 
 def drawn_to_the_arm():
     """The tip is where it ought to be, and the arm comes in from the other side."""
-    return replace(clip(), enters=0.8), "which so pulls it"
+    return replace(clip(), enters=0.8, width=480), "which so pulls it"
 
 
 def hooked():

@@ -29,31 +29,27 @@ FASTEST = 0.95  # of the highest speed: the rest is noise
 
 
 def check_way(
+    tracks: Tracks,
     tip: np.ndarray,
     thing: np.ndarray,
     way: np.ndarray,
     steps: tuple[int, int],
     ends: tuple[np.ndarray, np.ndarray],
-    enters: float,
 ) -> None:
     """Raise Unusable where the object is not pushed: the scenes' arm can only push.
 
-    tip, thing (N, 2) pixels; way (N,): how much of its way the object has gone, 0 to 1; steps: when
-    it is touched, and there; ends: where its way begins and ends; enters: where the arm comes in, 0
-    at the picture's left edge, 1 at its right, nan if unknown.
+    tracks: of the shot, which say where the arm comes in; tip, thing (N, 2) pixels; way (N,): how
+    much of its way the object has gone, 0 to 1; steps: when it is touched, and there; ends: where
+    its way begins and ends.
     """
     (i, j), (start, end) = steps, ends
     along = end - start
     length = np.linalg.norm(along)
-    from_left, from_right = enters < SIDEWAYS, enters > 1 - SIDEWAYS
-    if (from_left and along[0] < 0) or (from_right and along[0] > 0):
-        raise _pulled()
-    apart = np.linalg.norm(np.ptp((tip - thing)[: j + 1], axis=0))
-    if apart < GLUED * length and along[1] > COMES_DOWN * length:
+    door = (tracks.enters * tracks.width - tip[i, 0]) * np.sign(along[0])  # nan: no arm was seen
+    if tracks.width and door > PULLS * tracks.width:
         raise Unusable(
-            "the object never moves: what goes with the hand from the start, and comes down with "
-            "it, is the hand",
-            "film the task being done, with an object that is seen before the hand gets to it",
+            "the object comes towards the arm, which so pulls it",
+            "push it away from the arm, with the hand behind it",
         )
     aside = (thing[i : j + 1] - start) @ (np.array([-along[1], along[0]]) / length**2)
     if np.abs(aside).max() > LIFTED:
@@ -61,7 +57,7 @@ def check_way(
             f"the object leaves its straight way by {np.abs(aside).max():.0%} of its length",
             "push it straight along the table, without lifting it",
         )
-    if from_left or from_right:
+    if tracks.enters < SIDEWAYS or tracks.enters > 1 - SIDEWAYS:
         return
     ahead = (tip - start) @ along / length**2 - way  # (N,) of the way; the tip pushes from behind
     came = np.median(ahead[: max(1, i // 2)]) > AHEAD and ahead[i] > -RESTS
@@ -72,22 +68,18 @@ def check_way(
         )
 
 
-def check_door(tracks: Tracks, tip: float, along: float) -> None:
-    """Raise Unusable where the arm comes in ahead of its hand on the object's way, and so pulls it.
+def check_apart(apart: np.ndarray, along: np.ndarray) -> None:
+    """Raise Unusable where the object goes with the hand from the start, and comes down with it.
 
-    tip: where it is when it touches the object, in pixels from the left; along: how far to the
-    right the object goes.
+    apart (n, 2) pixels: from the object to the tip, until the object is there; along (2,): its way.
     """
-    ahead = (tracks.enters * tracks.width - tip) * np.sign(along)  # nan where no arm was seen
-    if tracks.width and ahead > PULLS * tracks.width:
-        raise _pulled()
-
-
-def _pulled():
-    return Unusable(
-        "the object comes towards the arm, which so pulls it",
-        "push it away from the arm, with the hand behind it",
-    )
+    length = np.linalg.norm(along)
+    if np.linalg.norm(np.ptp(apart, axis=0)) < GLUED * length and along[1] > COMES_DOWN * length:
+        raise Unusable(
+            "the object never moves: what goes with the hand from the start, and comes down with "
+            "it, is the hand",
+            "film the task being done, with an object that is seen before the hand gets to it",
+        )
 
 
 def check_hand(tracks: Tracks, t: np.ndarray, thing: np.ndarray, along: np.ndarray) -> None:

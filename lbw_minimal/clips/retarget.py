@@ -33,7 +33,7 @@ from lbw_minimal.clips.paths import (
     trusted,
     unsure,
 )
-from lbw_minimal.clips.pushing import check_door, check_hand, check_steps, check_way, gets_faster
+from lbw_minimal.clips.pushing import check_apart, check_hand, check_steps, check_way, gets_faster
 
 FPS = 25  # steps a second of the motion, as in the tasks
 CONTACT = 0.12  # of the object's way: by then it is pushed, whatever the tip's pixels say
@@ -94,8 +94,7 @@ def lay(tracks: Tracks, scene: Scene, mirror: bool | None = None) -> Motion:
 
     Raises Unusable if the clip does not show the task, or not so that it can be laid there.
     """
-    notes: list[str] = []
-    warnings: list[str] = []
+    notes, warnings = list[str](), list[str]()
     touched = scene.contact is not None
     if not touched:
         tracks = of_a_hand(tracks, notes)
@@ -123,12 +122,14 @@ def lay(tracks: Tracks, scene: Scene, mirror: bool | None = None) -> Motion:
         mirror = bool(end[0] < start[0])
         if mirror:
             notes.append("It goes to the left in the clip, and was mirrored.")
-    A = fit(start, end, scene, mirror)
-    x, way = apply(A, tip), progress(thing, start, end)  # (N, 2) m, (N,) from 0 to 1
+    way = progress(thing, start, end)  # (N,) from 0 to 1
     i, j = (int(np.argmax(way >= share)) for share in (CONTACT if touched else ARRIVED, ARRIVED))
     if touched:
-        check_way(tip, thing, way, (i, j), (start, end), tracks.enters)
-        check_door(tracks, tip[i, 0], end[0] - start[0])
+        check_apart((tip - thing)[: j + 1], end - start)
+    A = fit(start, end, scene, mirror)
+    x = apply(A, tip)  # (N, 2) m
+    if touched:
+        check_way(tracks, tip, thing, way, (i, j), (start, end))
         check_hand(tracks, t[i : j + 1], thing[i : j + 1], end - start)
         if not scene.hit:  # a hit thing may go far while it is a blur
             check_steps(seen, start, end)
