@@ -336,7 +336,7 @@ def test_patches_are_looked_for_and_chosen_as_they_were(pushed, golden):
         for part in (slice(32), slice(32, 64))
     ]
     small, figures = patches.shrunk(frames[::2], 0.8), {}
-    tip = patches._tip(found, np.arange(0, 32, 2), 0.8)
+    tip = patches.tip_at(found, np.arange(0, 32, 2), 0.8)
     places = [(0, 0.8 * thing[0]), (15, 0.8 * thing[30]), (4, (3.0, 30)), (2, (159.0, 95))]
     some = patches.paths(small, places, tip)
     for i, path in enumerate(some):

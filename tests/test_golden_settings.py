@@ -21,6 +21,7 @@ MODULES = {
         *("reader", "decoding", "hdr", "upright", "footage", "stills", "lookalike", "camera"),
         *("motion", "outline", "hiding", "paths", "pushing", "retarget", "screen", "shots", "arms"),
         "light",
+        "vanished",
     ),
     "tasks": tuple(tasks.TASKS),
     "tasks.world": ("arm", "bodies", "env", "motion", "reenact", "scene"),

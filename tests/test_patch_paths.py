@@ -113,9 +113,9 @@ def test_the_tip_is_known_where_it_is_seen_in_two_fifths_of_the_frames():
 
     k = np.array([0, 1, 2])
     np.testing.assert_allclose(
-        patches._tip(found([0, 2, 3, 9]), k, 0.5), 0.5 * np.array([(0, 0), (10, 5), (20, 10)])
+        patches.tip_at(found([0, 2, 3, 9]), k, 0.5), 0.5 * np.array([(0, 0), (10, 5), (20, 10)])
     )
-    assert patches._tip(found([0, 2, 3]), k, 0.5) is None
+    assert patches.tip_at(found([0, 2, 3]), k, 0.5) is None
 
 
 def test_what_has_gone_or_come_in_the_end_is_of_a_things_size_and_the_largest_comes_first():

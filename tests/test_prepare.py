@@ -274,10 +274,8 @@ def test_what_was_found_is_laid_by_the_clips_shorter_side_cuts_and_marks(monkeyp
         "check",
         lambda frames, cuts: Footage(frames, [f"cut at {cuts}"], slice(1, 4), None, True),
     )
-    shots = []
-    monkeypatch.setattr(
-        prepare, "coming_in", lambda frames, off: shots.append(len(frames)) or Arms(1.0, 0.0, 0.2)
-    )
+    arm, shots = Arms(1.0, 0.0, 0.2, True, 0.0), []
+    monkeypatch.setattr(prepare, "coming_in", lambda frames, off: shots.append(len(frames)) or arm)
     monkeypatch.setattr(
         prepare,
         "lay",

@@ -21,7 +21,8 @@ FEW = (
     "6 frames are too few, even without cuts 8 are needed; film the whole motion in one go, at 10 "
     "frames a second or more."
 )
-ONE, NONE = Arms(1.0, 0.0, 0.5), Arms(0.0, 0.0, np.nan)  # arms that come in
+ONE = Arms(1.0, 0.0, 0.5, True, 0.0)  # arms that come in
+NONE = Arms(0.0, 0.0, np.nan, False, 0.0)
 
 
 def clip(n=6, height=90, width=160, start=0.0):
@@ -201,6 +202,7 @@ def test_the_surer_look_counts_and_for_a_hand_that_touches_nothing_the_one_at_wh
         return Found(*[np.arange(n) + 10 * n] * 2, *sure)
 
     monkeypatch.setattr(prepare, "mended", lambda frames, found: (found, True))
+    monkeypatch.setattr(prepare.vanished, "followed", lambda frames, found: found)
     monkeypatch.setattr(prepare, "gone", lambda found: 0.0)
     found = prepare.looked(SimpleNamespace(detect=detect), frames, touched)
     assert found.tip.tolist() == tip and found.object.tolist() == thing
@@ -233,12 +235,51 @@ def test_of_what_patches_make_of_the_looks_the_object_is_pushed_or_else_goes_far
         return Found(*[np.full(n, 10 * n)] * 2, np.full(n, 0.9 - 0.1 * n), np.full(n, 0.5))
 
     monkeypatch.setattr(prepare, "mended", mended)
+    monkeypatch.setattr(prepare.vanished, "followed", lambda frames, found: found)
     monkeypatch.setattr(prepare, "gone", lambda found: ways[found.object[0]])
     frames = np.zeros((5, 84, 84, 3), np.uint8)
     frames[:3, 40:50, 20:30] = frames[3:, 40:50, 50:60] = 200
     found = prepare.looked(SimpleNamespace(detect=detect), frames, touched)
     assert found.object.tolist() == [object_] * 5
     assert found.tip.tolist() == [20] * 5  # the look at the two frames is surer
+
+
+@pytest.mark.parametrize("touched", [False, True])
+def test_what_has_left_its_place_may_be_the_object_where_one_is_touched(touched, monkeypatch):
+    def detect(seen):
+        n = len(seen)
+        return Found(np.zeros((n, 2)), np.zeros((n, 2)), np.full(n, 0.9), np.full(n, 0.9))
+
+    def followed(seen, found):
+        assert seen is frames
+        return replace(found, object=found.object + 7)
+
+    monkeypatch.setattr(prepare, "told", lambda frames: np.arange(2))
+    monkeypatch.setattr(prepare, "mended", lambda frames, found: (found, True))
+    monkeypatch.setattr(prepare, "reaching", lambda frames, found: found)
+    monkeypatch.setattr(prepare.vanished, "followed", followed)
+    frames = np.zeros((10, 84, 84, 3), np.uint8)
+    found = prepare.looked(SimpleNamespace(detect=detect), frames, touched)
+    assert found.object[0, 0] == (7 if touched else 0)
+
+
+@pytest.mark.parametrize(
+    ("whole", "moving", "seen"), [(0.05, 0.3, 0.3), (0.4, 0.2, 0.4)], ids=["rests", "moves"]
+)
+def test_an_arm_that_rests_is_seen_where_something_moves(whole, moving, seen, monkeypatch):
+    """All else is told by the look at all frames: ten of them, two of which show something new."""
+    frames, off = np.zeros((10, 84, 84, 3), np.uint8), object()
+    both = {10: Arms(whole, 0.1, 0.3, True, 0.2), 2: Arms(moving, 0.9, 0.7, False, 0.8)}
+
+    def count(masks, moved):
+        assert moved is off
+        return both[masks]
+
+    monkeypatch.setattr(prepare, "Detector", SimpleNamespace(
+        load=lambda path: SimpleNamespace(arms=len)))  # fmt: skip
+    monkeypatch.setattr(prepare, "told", lambda frames: np.array([0, 6]))
+    monkeypatch.setattr(prepare.arms, "count", count)
+    assert prepare.coming_in(frames, off) == (seen, 0.1, 0.3, True, 0.2)
 
 
 @pytest.mark.parametrize("touched", [False, True])
@@ -292,18 +333,21 @@ def test_a_thing_that_is_touched_should_be_in_sight_unless_the_user_placed_it(
     contact, name, asked, monkeypatch
 ):
     nothing, seen = Found(np.zeros((6, 2)), np.zeros((6, 2)), np.zeros(6), np.zeros(6)), []
+    looked = []
     motion = SimpleNamespace(times=np.arange(4) / 10, contact=1, arrival=3)
     monkeypatch.setattr(prepare, "look", lambda frames, cuts, touched: nothing)
     monkeypatch.setattr(prepare, "coming_in", lambda frames, off: ONE)
     monkeypatch.setattr(
         prepare.footage, "check", lambda frames, cuts: Footage(frames, [], slice(None), None, False)
     )
+    monkeypatch.setattr(prepare.vanished, "check_seen", lambda *what: looked.append(what))
     monkeypatch.setattr(prepare, "lay", lambda tracks, scene, mirror: motion)
     monkeypatch.setattr(prepare, "unlike", lambda frames, tracks, *w: seen.append(w) or ["Hidden?"])
     result = prepared(scene=SimpleNamespace(contact=contact))
     choices = Choices(**({name: ((5.0, 5.0, 0.1),)} if name else {}))
     assert follow(result, choices) is motion
     assert seen == ([(0.1, pytest.approx(0.3))] if asked else [])
+    assert [[len(one) for one in what] for what in looked] == [[6, 6, 6]] * asked
     assert ("Hidden?" in result.warnings) == asked
 
 

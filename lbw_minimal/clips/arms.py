@@ -43,8 +43,8 @@ class Arms(NamedTuple):
     seen: float  # share of the frames in which the masks show one or more
     several: float  # share of the frames in which they show two beside each other
     enters: float  # where the largest comes in, 0 at the picture's left edge, 1 at its right; nan
-    moves: bool = False  # whether something as large as an arm moves over an edge
-    across: float = 0.0  # share of the frames in which large things are at both side edges
+    moves: bool  # whether something as large as an arm moves over an edge
+    across: float  # share of the frames in which large things are at both side edges
 
     @property
     def doubt(self) -> tuple[str, str] | None:

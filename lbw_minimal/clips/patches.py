@@ -119,7 +119,7 @@ def mended(frames: np.ndarray, found: Found) -> tuple[Found, bool]:
     """
     k = np.unique(np.linspace(0, len(frames) - 1, LOOK_AT).round().astype(int))
     scale = min(1.0, SMALL / max(frames.shape[1:3]))
-    tip = _tip(found, k, scale)
+    tip = tip_at(found, k, scale)
     side = round(min(frames.shape[1:3]) * scale)
     own = Path(found.object[k] * scale, found.object_sure[k], tip, side)
     if own.seen and own.pushed:
@@ -209,7 +209,7 @@ def _changed(small):
     return [middle for _, middle in things[:LEFT]]
 
 
-def _tip(found, k, scale):
+def tip_at(found: Found, k: np.ndarray, scale: float) -> np.ndarray | None:
     """Where the tip (n, 2) is in frames k, between those in which it is surely seen; None if
     these are few."""
     sure = np.flatnonzero(found.tip_sure > SURE)

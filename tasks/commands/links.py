@@ -54,6 +54,13 @@ def mark(clip: Path) -> str:
     return f"{clip.stat().st_size}-{digest[:16]}"
 
 
+def note_of(file: Path, task: str, command: str) -> dict[str, str]:
+    """What stays known of a clip: its name and mark, the task, its "corrections", none as yet, and
+    the "command" that prepares it."""
+    return {"clip": file.name, "mark": mark(file), "task": task, "corrections": "",
+            "command": command}  # fmt: skip
+
+
 def noted(path: Path) -> dict[str, str]:
     """The note in a folder; nothing where there is none."""
     try:

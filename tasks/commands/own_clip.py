@@ -13,8 +13,8 @@ import shutil
 from pathlib import Path
 
 from lbw_minimal.training import write_atomic
-from tasks.commands.links import FILM, NOTE, links
-from tasks.commands.prepare import PAGE, STILLS, Prepared, note_of, write
+from tasks.commands.links import FILM, NOTE, links, note_of
+from tasks.commands.prepare import PAGE, STILLS, Prepared, write
 
 NAV = re.compile(r"<nav.*?</nav>\n", re.DOTALL)
 

@@ -20,7 +20,7 @@ import numpy as np
 
 import tasks
 from lbw_minimal import imitate, video
-from lbw_minimal.clips import arms, footage, light, screen
+from lbw_minimal.clips import arms, footage, light, screen, vanished
 from lbw_minimal.clips.detector import Detector, Found, refine
 from lbw_minimal.clips.hiding import unlike
 from lbw_minimal.clips.motion import small, told
@@ -37,7 +37,7 @@ from lbw_minimal.report import COLUMNS
 from lbw_minimal.training import InputError, write_atomic
 from tasks.commands import make_folder
 from tasks.commands.choices import Choices, Misplaced, parser
-from tasks.commands.links import FILM, NOTE, RUNS, folder, links, mark, noted
+from tasks.commands.links import FILM, NOTE, RUNS, folder, links, note_of, noted
 from tasks.world.reenact import Reenactment, reenact
 
 PAGE = "prepare.html"
@@ -154,13 +154,6 @@ def prepare(name: str, path: Path, choices: Choices | None = None) -> Prepared:
     return result
 
 
-def note_of(file: Path, task: str, command: str) -> dict[str, str]:
-    """What stays known of a clip: its name and mark, the task, its "corrections", none as yet, and
-    the "command" that prepares it."""
-    return {"clip": file.name, "mark": mark(file), "task": task, "corrections": "",
-            "command": command}  # fmt: skip
-
-
 def usable(name: str, path: Path) -> Prepared:
     """The user's clip, re-enacted for the task; what is odd about it is said.
 
@@ -209,27 +202,29 @@ def follow(result: Prepared, choices: Choices) -> Motion:
     if arm.doubt:
         if not choices.tip:
             raise Unusable(*arm.doubt)
-        reason, _ = arm.doubt
-        result.warnings.append(
-            f"{reason[0].upper()}{reason[1:]}: it was searched all the same, because you placed "
-            "the tip."
-        )
+        said = arm.doubt[0].capitalize()
+        result.warnings.append(f"{said}: it was searched all the same, because you placed the tip.")
     rate = (len(frames) - 1) / max(1e-9, tracks.times[-1] - tracks.times[0])
     result.notes.append(
         f"{len(frames)} frames at {rate:.3g} a second; their motion was smoothed and taken at "
         f"{FPS} a second, by the time stamps."
     )
+    unplaced = result.scene.contact is not None and not choices.object
+    if unplaced:
+        vanished.check_seen(*(of[seen.shot] for of in (frames, tracks.tip, tracks.tip_sure)))
     motion = lay(tracks, result.scene, choices.mirror)
-    if result.scene.contact is not None and not choices.object:
+    if unplaced:
         touch, there = motion.times[[motion.contact, motion.arrival]]
         result.warnings += unlike(frames, tracks, touch, there)
     return motion
 
 
 def coming_in(frames: np.ndarray, off: np.ndarray) -> arms.Arms:
-    """The arms that come into the frames of one shot, as the shipped detector sees them and by what
-    is `off` the room, see `Footage`."""
-    return arms.count(Detector.load(EYES).arms(frames), off)
+    """The arms that come into a shot's frames, as the shipped detector sees them and by what is
+    `off` the room, see `Footage`. One that rests for long is seen where something has moved."""
+    model = Detector.load(EYES)
+    arm, moving = (arms.count(model.arms(n), off) for n in (frames, frames[told(frames)]))
+    return arm._replace(seen=max(arm.seen, moving.seen))
 
 
 def look(frames: np.ndarray, cuts: Sequence[int], touched: bool) -> Found:
@@ -265,7 +260,8 @@ def looked(model: Detector, frames: np.ndarray, touched: bool) -> Found:
     if touched:  # the one that is surer of both is asked already
         looks += [one for one in (whole, moving) if not (one is hand and one is thing)]
     thing, _ = max((mended(frames, one) for one in looks), key=lambda m: (m[1], gone(m[0])))
-    return Found(hand.tip, thing.object, hand.tip_sure, thing.object_sure)
+    found = Found(hand.tip, thing.object, hand.tip_sure, thing.object_sure)
+    return vanished.followed(frames, found) if touched else found
 
 
 def stills(result: Prepared) -> np.ndarray:

@@ -1,0 +1,139 @@
+"""What has left its place by the end of a shot, and where it is seen from then on.
+
+Not from the paper. A thing that is pushed is gone from where it stood. Its picture in the first
+frames is looked for in the later ones, and only where these differ from the first: a tile or a knob
+that was there before is another thing. So the thing's way is known without the detector; and if it
+is seen nowhere, something is before it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import cv2
+import numpy as np
+
+from lbw_minimal.clips.detector import Found
+from lbw_minimal.clips.patches import CHANGED, LOOK_AT, SMALL, Path, shrunk, tip_at
+from lbw_minimal.clips.paths import SURE, Unusable
+
+ENDS = 16  # a shot's first and last frames are so many of it
+THING = 25, 40  # pixels of the small frames: least area, and most width or height
+STOOD = 1.5  # times: what stood has sharper edges than the ground that it leaves behind
+COVERED = 0.5  # of the thing's pixels that have changed: then it has left
+MOVED = 0.4  # of the pixels where it is looked for that have changed
+ALIKE = 0.67  # correlation: of things in sight it was 0.71 or more, of hidden ones mostly 0.64
+FOLLOWED = 0.8  # correlation, in half of the frames: then its way is known
+OFTEN = 0.25  # of the frames
+BESIDE = 16  # pixels of the small frames, a tenth of the picture: what is nearer may be the hand
+AGREES = 4.0, 0.8  # pixels of the small frames, share of them: the detector is believed
+
+
+class Vanished(NamedTuple):
+    """A thing that is gone in the end, in n frames of a shot."""
+
+    frames: np.ndarray  # (n,) which frames
+    places: np.ndarray  # (n, 2) pixels of the small frames
+    alike: np.ndarray  # (n,) correlation with the thing as it stood; 1 while it stands
+    left: int  # the first of the n in which it has left
+    scale: float  # pixels of the small frames in a pixel
+
+
+def vanished(frames: np.ndarray) -> Vanished | None:
+    """The largest thing that has left its place in the frames (T, H, W, 3) uint8 of one shot, or
+    None."""
+    k = np.unique(np.linspace(0, len(frames) - 1, LOOK_AT).round().astype(int))
+    scale = min(1.0, SMALL / max(frames.shape[1:3]))
+    small = np.stack(shrunk(frames[k], scale))
+    few = max(1, len(small) // ENDS)
+    first, last = (np.median(part, axis=0) for part in (small[:few], small[-few:]))
+    thing = _largest(first, last)
+    if thing is None:
+        return None
+    changed = np.abs(small - first).max(axis=3) > CHANGED  # (n, h, w)
+    stands = np.flatnonzero(changed[:, thing].mean(axis=1) < COVERED)
+    left = int(stands[-1]) + 1 if len(stands) else 0
+    y, x = np.nonzero(thing)
+    top, low, near, far = max(0, y.min() - 1), y.max() + 2, max(0, x.min() - 1), x.max() + 2
+    patch = first[top:low, near:far].astype(np.uint8)
+    half = np.array(patch.shape[1::-1]) / 2
+    places, alike = np.tile(half + (near, top), (len(k), 1)), np.ones(len(k))
+    for t in range(left, len(k)):
+        places[t], alike[t] = _found(small[t], patch, changed[t])
+        places[t] += half
+    return Vanished(k, places, alike, left, scale)
+
+
+def _largest(first, last):
+    """The mask (h, w) of the largest thing in the first picture that is not in the last, or None:
+    nothing that reaches over an edge."""
+    differs = (np.abs(first - last).max(axis=2) > CHANGED).astype(np.uint8)
+    differs = cv2.morphologyEx(differs, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(differs)
+    before, after = _edges(first), _edges(last)
+    best, most = None, THING[0] - 1
+    for i, (x, y, w, h, area) in enumerate(stats[1:].tolist(), 1):
+        inside = min(x, y) > 1 and x + w < differs.shape[1] - 1
+        if area <= most or max(w, h) > THING[1] or not inside:
+            continue
+        piece = (labels == i).astype(np.uint8)
+        rim = cv2.dilate(piece, np.ones((3, 3))) > cv2.erode(piece, np.ones((3, 3)))
+        if before[rim].mean() > STOOD * after[rim].mean():
+            best, most = piece > 0, area
+    return best
+
+
+def _edges(picture):
+    """How steep a picture (h, w, 3) is at each pixel, (h, w)."""
+    slopes = (cv2.Sobel(picture.astype(np.float32), cv2.CV_32F, *to) for to in ((1, 0), (0, 1)))
+    return np.hypot(*slopes).max(axis=2)
+
+
+def _found(frame, patch, changed):
+    """The upper left corner (2,) at which a frame (h, w, 3) is most like a patch among what changed
+    (h, w), and how much; -1 where nothing changed."""
+    alike = cv2.matchTemplate(frame, patch, cv2.TM_CCOEFF_NORMED)
+    h, w = alike.shape
+    share = cv2.blur(changed.astype(np.float32), patch.shape[1::-1], anchor=(0, 0))[:h, :w]
+    _, height, _, at = cv2.minMaxLoc(np.where(share >= MOVED, alike, -1).astype(np.float32))
+    return np.array(at, float), height
+
+
+def check_seen(frames: np.ndarray, tip: np.ndarray, sure: np.ndarray) -> None:
+    """Raise Unusable where the largest thing that has left its place in the frames (T, H, W, 3)
+    uint8 of one shot is seen nowhere from then on, and is not the hand as it was first.
+
+    tip (T, 2) pixels, sure (T,): the hand; where it is never sure nothing is asked.
+    """
+    thing, hand = vanished(frames), tip[sure >= SURE]
+    if thing is None or not len(hand):
+        return
+    apart = np.linalg.norm(hand[0] * thing.scale - thing.places[0])
+    if apart >= BESIDE and (thing.alike[thing.left :] >= ALIKE).mean() < OFTEN:
+        raise Unusable(
+            "the arm hides the object, which is gone from its place and seen nowhere else",
+            "push it from behind, with the hand between it and the edge of the picture",
+        )
+
+
+def followed(frames: np.ndarray, found: Found) -> Found:
+    """Found in the frames (T, H, W, 3) uint8 of one shot, with the way of the thing that has left
+    its place as the object's where that is another one, and that of a thing that is pushed."""
+    thing = vanished(frames)
+    if thing is None or np.median(thing.alike[thing.left :]) < FOLLOWED:
+        return found
+    k, scale, n = thing.frames, thing.scale, len(frames)
+    side = round(min(frames.shape[1:3]) * scale)
+    path = Path(thing.places, thing.alike, tip_at(found, k, scale), side)
+    sure = found.object_sure[k] >= SURE
+    near = np.linalg.norm(found.object[k] * scale - thing.places, axis=1) < AGREES[0]
+    if not path.pushed or (near & sure).mean() >= AGREES[1]:
+        return found
+    along = np.arange(n)
+    places = [np.interp(along, k, thing.places[:, axis] / scale) for axis in (0, 1)]
+    return replace(
+        found,
+        object=np.stack(places, 1),
+        object_sure=np.interp(along, k, np.clip(1 + (thing.alike - 1) / 0.8, 0, 1)),
+    )

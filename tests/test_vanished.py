@@ -1,0 +1,139 @@
+"""What has left its place, by squares before a wall of 160x120 pixels, which no frame shrinks."""
+
+import cv2
+import numpy as np
+import pytest
+
+from lbw_minimal.clips import vanished
+from lbw_minimal.clips.detector import Found
+from lbw_minimal.clips.paths import Unusable
+
+N, LEAVES, THERE = 48, 12, 24  # frames: in all, and between which the thing moves
+RNG = np.random.default_rng(0)
+WALL = cv2.GaussianBlur(RNG.integers(60, 120, (120, 160, 3)).astype(np.uint8), (0, 0), 4)
+THING = np.full((14, 14, 3), (220, 60, 30), np.uint8)
+THING[3:7, 3:11] = (20, 40, 160)
+HAND = np.full((30, 30, 3), (200, 160, 140), np.uint8)
+WAY = np.interp(np.arange(N), [LEAVES, THERE], [60, 100]).round().astype(int)
+
+
+def put(frame, what, x, y):
+    frame[y : y + len(what), x : x + what.shape[1]] = what
+
+
+def film(x=WAY, thing=THING, hides=lambda t: False, also=None):
+    """A thing whose left edge is at x, 70 down; `hides`: in which frames a hand is before it."""
+    frames = np.repeat(WALL[None], N, 0)
+    for t, frame in enumerate(frames):
+        if also is not None:
+            put(frame, THING, *also)
+        put(frame, thing, x[t], 70)
+        if hides(t):
+            put(frame, HAND, x[t] - 8, 62)
+    return frames
+
+
+def test_a_thing_that_has_left_its_place_is_found_where_it_went():
+    thing = vanished.vanished(film())
+    middle = np.stack([WAY + 7, np.full(N, 77)], 1)
+    assert thing.frames.tolist() == list(range(N)) and thing.scale == 1
+    assert LEAVES < thing.left < THERE and (thing.alike[: thing.left] == 1).all()
+    late = slice(LEAVES + 8, N)  # half of it is off its place
+    assert np.abs(thing.places - middle)[late].max() <= 1.5 and thing.alike[late].min() > 0.85
+    assert np.abs(thing.places[: thing.left] - middle[0]).max() <= 1.5
+
+
+def test_places_are_those_of_the_small_frames():
+    large = np.stack([cv2.resize(frame, (320, 240)) for frame in film()])
+    thing = vanished.vanished(large)
+    assert thing.scale == 0.5 and np.abs(thing.places[-1] - (107, 77)).max() <= 1.5
+
+
+@pytest.mark.parametrize(
+    ("thing", "told"),
+    [
+        (THING, True),
+        (THING[:4, :4], False),  # 16 pixels
+        (np.repeat(np.repeat(THING, 2, 0), 2, 1), True),  # 28 wide
+        (np.tile(THING, (1, 3, 1)), False),  # 42 wide
+    ],
+    ids=["14x14", "4x4", "28x28", "42x14"],
+)
+def test_a_thing_has_the_size_of_one(thing, told):
+    x = np.where(np.arange(N) < LEAVES, 40, 100)
+    assert (vanished.vanished(film(x, thing)) is not None) == told
+
+
+def test_what_has_come_or_reaches_over_an_edge_or_stays_has_not_left():
+    assert vanished.vanished(film(np.where(np.arange(N) < LEAVES, 0, 60))) is None
+    assert vanished.vanished(film(np.full(N, 60))) is None
+    come = film()
+    come[:LEAVES] = WALL
+    assert vanished.vanished(come) is None
+
+
+TIP = np.tile([20.0, 20.0], (N, 1))
+
+
+def seen(frames, tip=TIP, sure=0.9):
+    vanished.check_seen(frames, tip, np.broadcast_to(sure, N))
+
+
+def test_a_thing_that_is_seen_nowhere_from_then_on_is_hidden():
+    seen(film())
+    for other in (None, (20, 20)):  # its like that stood there all along is another thing
+        with pytest.raises(Unusable, match="hides the object, which is gone from its place"):
+            seen(film(hides=lambda t: t >= LEAVES, also=other))
+
+
+@pytest.mark.parametrize(("frames", "hidden"), [(7, True), (14, False)])
+def test_a_thing_is_in_sight_if_it_is_so_in_a_quarter_of_the_frames(frames, hidden):
+    """Of the 36 or fewer after it has left."""
+    clip = film(hides=lambda t: LEAVES <= t < N - frames)
+    clip[-3:] = clip[-4]
+    if hidden:
+        with pytest.raises(Unusable, match="seen nowhere else"):
+            seen(clip)
+    else:
+        seen(clip)
+
+
+def test_what_stood_where_the_hand_was_first_is_the_hand():
+    gone = film(hides=lambda t: t >= LEAVES)
+    place = vanished.vanished(gone).places[0]
+    for apart, raised in ((15, False), (17, True)):
+        tip = np.tile(place - (apart, 0), (N, 1))
+        tip[1:] = 20  # later it is elsewhere
+        if raised:
+            with pytest.raises(Unusable, match="seen nowhere else"):
+                seen(gone, tip)
+        else:
+            seen(gone, tip)
+            with pytest.raises(Unusable, match="seen nowhere else"):  # not where it is unsure
+                seen(gone, tip, np.where(np.arange(N) < 1, 0.4, 0.9))
+    seen(gone, sure=0.4)
+
+
+def found(x, y=77.0):
+    """A hand that comes to the thing while it rests, and an object."""
+    tip = np.stack([np.interp(np.arange(N), [0, LEAVES, THERE], [10, 55, 95]), np.full(N, 77)], 1)
+    return Found(tip, np.stack([x, np.broadcast_to(y, N)], 1), np.full(N, 0.9), np.full(N, 0.7))
+
+
+def test_a_thing_that_is_pushed_from_its_place_is_the_object():
+    before = found(WAY + 7.0, 40)
+    told = vanished.followed(film(), before)
+    assert np.abs(told.object - np.stack([WAY + 7, np.full(N, 77)], 1))[LEAVES + 8 :].max() <= 1.5
+    assert told.object_sure.min() > 0.5 and told.tip is before.tip
+
+
+def test_the_detector_is_believed_where_it_agrees_and_where_the_thing_is_not_pushed_or_hidden():
+    agrees = found(WAY + 9.0)
+    assert vanished.followed(film(), agrees) is agrees
+    off = found(WAY + 13.0)  # six pixels beside it
+    assert vanished.followed(film(), off) is not off
+    hidden = film(hides=lambda t: t >= LEAVES)
+    assert vanished.followed(hidden, off) is off
+    swings = film((WAY + 20 * np.sin(np.arange(N))).astype(int))
+    assert vanished.followed(swings, off) is off
+    assert vanished.followed(film(np.full(N, 60)), off) is off
