@@ -122,7 +122,9 @@ def test_a_thing_that_moves_without_an_arm_is_told_from_a_room_in_which_nothing_
     noise = np.random.default_rng(1).normal(0, 3, film.shape)
     seen = footage.check(np.clip(film + noise, 0, 255).astype(np.uint8))
     why, remedy = seen.still
-    assert why == "nothing moves in the clip" and remedy.startswith("record from before the hand")
+    assert why.startswith("nothing moves in the clip") and remedy.startswith(
+        "record from before the hand"
+    )
     for i, frame in enumerate(film):
         frame[70:78, 40 + i : 48 + i] = (200, 40, 30)
     why, remedy = footage.check(film).still

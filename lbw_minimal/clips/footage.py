@@ -73,7 +73,8 @@ def _still(moves):
     """Why nothing large is among what moves (T, 84, 84), and the remedy."""
     if _speck(moves):
         return "no arm is seen, only something small moves", SIDE_ON
-    return "nothing moves in the clip", "record from before the hand comes in until all is done"
+    said = "nothing moves in the clip, as far as is seen"
+    return said, "record from before the hand comes in until all is done"
 
 
 def _steadied(frames, shots, longest):
