@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from toy_clips import shows
+from toy_clips import encode, room, shows
 
 from lbw_minimal import tracks, video
 from lbw_minimal.clips import page
@@ -97,6 +97,25 @@ def test_what_is_not_usable_ends_with_2_and_a_page_that_says_why(filmed, eyes, t
         and "data-time=" in page
     )
     assert not (tmp_path / "reenactment.mp4").exists()
+
+
+@pytest.mark.parametrize(
+    ("gain", "more", "said"),
+    [(0.15, 60, "dark"), (1, 10, "Something large comes in"), (1, 60, "")],
+)
+def test_a_refused_clip_says_whether_it_is_dark_or_its_arm_like_the_room(
+    gain, more, said, tmp_path
+):
+    """A bar that comes in and pushes nothing, before a still room."""
+    frames = np.repeat(room()[None], 30, axis=0) + np.random.default_rng(0).normal(
+        0, 2, (30, 1, 1, 1)
+    )
+    for i, frame in enumerate(frames):
+        frame[48:64, : max(0, 4 * i - 20)] += more
+    path = encode(tmp_path / "a.mp4", np.clip(gain * frames, 0, 255).astype(np.uint8))
+    result = prepare.prepare("push", path)
+    poor = [words for words in ("dark", "Something large comes in") if words in result.why_not]
+    assert result.why_not and poor == [said] * bool(said)
 
 
 def test_a_file_that_is_no_video_is_not_usable(tmp_path, capfd):
