@@ -91,6 +91,25 @@ def test_a_gap_of_half_a_second_is_a_jump_only_where_something_changed():
     assert jumps(film(even, side=112), times) == []
 
 
+@pytest.mark.parametrize(
+    ("beside", "leap", "at_once"),
+    [(0, 40, True), (0, 2, False), (4, 40, True), (20, 35, False), (20, 0, False)],
+    ids=["at rest", "hardly", "moving", "in a hit", "as before"],
+)
+@pytest.mark.parametrize("t", [1, 5, 9])
+def test_a_jump_changes_far_more_at_once_than_what_moves_just_before_and_after(
+    beside, leap, at_once, t
+):
+    """A square of 20 pixels, that goes on by so many in each frame and by more in one."""
+    x = 5.0 + np.cumsum(np.where(np.arange(10) == t, leap, 0))
+    near = np.isin(np.arange(10), [t - 1, t + 1]) & (np.arange(10) > 0)
+    x += np.cumsum(np.where(near, beside, 0))
+    frames = np.full((10, 84, 150, 3), 60, np.uint8)
+    for frame, at in zip(frames, x.astype(int), strict=True):
+        frame[40:60, at : at + 20] = 200
+    assert motion._at_once(frames, t) == at_once
+
+
 def test_the_first_four_grey_levels_of_a_change_do_not_count():
     assert motion._strong(np.array([[4.0, -4.0], [6.0, -9.0]])) == pytest.approx((2 + 5) / 4)
 
@@ -129,6 +148,7 @@ def test_a_jump_is_three_times_what_is_usual_nearby_and_more_where_frames_are_fa
     rest = np.zeros(40)
     rest[[17, 18, 22, 23]], rest[20] = 1.0, times
     monkeypatch.setattr(motion, "_unexplained", lambda frames, size: (rest, rest))
+    monkeypatch.setattr(motion, "_at_once", lambda frames, t: True)
     frames = np.zeros((41, 84, 84, 3), np.uint8)
     assert jumps(frames, np.arange(41) / rate) == ([21] if jumped else [])
 
@@ -138,9 +158,11 @@ def test_what_noise_does_everywhere_is_no_motion(monkeypatch):
     rest = np.zeros(40)
     rest[[17, 18, 22, 23]], rest[20] = 1.0, 3.4
     frames = np.zeros((41, 84, 84, 3), np.uint8)
+    monkeypatch.setattr(motion, "_at_once", lambda frames, t: True)
     for noise in (0, 5):
         monkeypatch.setattr(motion, "_unexplained", lambda *_, n=noise: (rest + n, rest + n))
         assert jumps(frames, np.arange(41) / 25) == [21]
+    monkeypatch.setattr(motion, "_at_once", lambda frames, t: True)
     monkeypatch.setattr(motion, "_unexplained", lambda *_: (0 * rest + 5, 0 * rest + 5))
     late = np.arange(41) / 25 + 2 * (np.arange(41) > 30)  # a pause in which nothing changed
     assert jumps(frames, late) == []
@@ -164,6 +186,7 @@ def test_what_is_usual_is_told_by_a_quarter_of_a_second_or_two_frames_on_each_si
     rest = np.zeros(40)
     rest[[20 - at, 20, 20 + at]] = 20.0
     monkeypatch.setattr(motion, "_unexplained", lambda frames, size: (rest, rest))
+    monkeypatch.setattr(motion, "_at_once", lambda frames, t: True)
     found = jumps(np.zeros((41, 84, 84, 3), np.uint8), np.arange(41) / rate)
     assert (21 in found) == jumped
 
@@ -176,5 +199,6 @@ def test_a_change_of_a_tenth_of_a_level_is_noise(level, pause, jumped, monkeypat
     rest = np.zeros(40)
     rest[20] = level
     monkeypatch.setattr(motion, "_unexplained", lambda frames, size: (rest, rest))
+    monkeypatch.setattr(motion, "_at_once", lambda frames, t: True)
     times = np.arange(41) / 25 + pause * (np.arange(41) > 20)
     assert jumps(np.zeros((41, 84, 84, 3), np.uint8), times) == [21] * jumped

@@ -225,6 +225,7 @@ def test_what_more_than_half_of_the_frames_do_is_motion_and_no_noise(share, foun
     residual = np.where(np.arange(30) < 12, 0, 1.0)
     residual[20] = share * motion.JUMP
     monkeypatch.setattr(motion, "_unexplained", lambda frames, size: (residual, residual))
+    monkeypatch.setattr(motion, "_at_once", lambda frames, t: True)
     assert motion.jumps(np.zeros((31, 8, 8, 3), np.uint8), np.arange(31) / 25) == found
 
 
