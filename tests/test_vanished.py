@@ -86,6 +86,15 @@ def test_a_thing_that_is_seen_nowhere_from_then_on_is_hidden():
             seen(film(hides=lambda t: t >= LEAVES, also=other))
 
 
+@pytest.mark.parametrize("place", [(-25, 0), (8, 0), (0, -25), (0, 8)])
+def test_a_thing_of_which_a_hand_covers_a_half_is_in_sight(place):
+    clip = film()
+    for t in range(LEAVES + 1, N):
+        x, y = place
+        put(clip[t], HAND, WAY[t] + x, 70 + y)
+    seen(clip)
+
+
 @pytest.mark.parametrize(("frames", "hidden"), [(7, True), (14, False)])
 def test_a_thing_is_in_sight_if_it_is_so_in_a_quarter_of_the_frames(frames, hidden):
     """Of the 36 or fewer after it has left."""

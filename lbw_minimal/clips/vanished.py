@@ -8,6 +8,7 @@ is seen nowhere, something is before it.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -23,9 +24,11 @@ THING = 25, 40  # pixels of the small frames: least area, and most width or heig
 STOOD = 1.5  # times: what stood has sharper edges than the ground that it leaves behind
 COVERED = 0.5  # of the thing's pixels that have changed: then it has left
 MOVED = 0.4  # of the pixels where it is looked for that have changed
-ALIKE = 0.67  # correlation: of things in sight it was 0.71 or more, of hidden ones mostly 0.64
+# How unlike the most alike half of a thing is, times how unlike that is the ground it left, in a
+# quarter of the frames: of 24 usable things it was 0.34 at most, of seven hidden ones in eleven
+# 0.46 or more. A hand that pushes covers a half.
+UNLIKE, OFTEN = 0.4, 0.25
 FOLLOWED = 0.8  # correlation, in half of the frames: then its way is known
-OFTEN = 0.25  # of the frames
 BESIDE = 16  # pixels of the small frames, a tenth of the picture: what is nearer may be the hand
 AGREES = 4.0, 0.8  # pixels of the small frames, share of them: the detector is believed
 
@@ -38,6 +41,7 @@ class Vanished(NamedTuple):
     alike: np.ndarray  # (n,) correlation with the thing as it stood; 1 while it stands
     left: int  # the first of the n in which it has left
     scale: float  # pixels of the small frames in a pixel
+    unlike: Callable[[], np.ndarray]  # how unlike it its most alike half is after that, (n - left,)
 
 
 def vanished(frames: np.ndarray) -> Vanished | None:
@@ -55,14 +59,21 @@ def vanished(frames: np.ndarray) -> Vanished | None:
     stands = np.flatnonzero(changed[:, thing].mean(axis=1) < COVERED)
     left = int(stands[-1]) + 1 if len(stands) else 0
     y, x = np.nonzero(thing)
-    top, low, near, far = max(0, y.min() - 1), y.max() + 2, max(0, x.min() - 1), x.max() + 2
-    patch = first[top:low, near:far].astype(np.uint8)
+    box = slice(max(0, y.min() - 1), y.max() + 2), slice(max(0, x.min() - 1), x.max() + 2)
+    patch, mask = first[box].astype(np.uint8), thing[box].astype(np.uint8)
     half = np.array(patch.shape[1::-1]) / 2
-    places, alike = np.tile(half + (near, top), (len(k), 1)), np.ones(len(k))
+    places, alike = np.tile(half + (box[1].start, box[0].start), (len(k), 1)), np.ones(len(k))
     for t in range(left, len(k)):
-        places[t], alike[t] = _found(small[t], patch, changed[t])
-        places[t] += half
-    return Vanished(k, places, alike, left, scale)
+        match = cv2.matchTemplate(small[t], patch, cv2.TM_CCOEFF_NORMED)
+        _, alike[t], _, at = cv2.minMaxLoc(_among(changed[t], match, patch, -1))
+        places[t] = half + at
+    ground = np.sqrt(((first - last)[thing] ** 2).mean())
+
+    def unlike():
+        halves = [_unlike(small[left:], changed[left:], *half) for half in _halves(patch, mask)]
+        return np.min(halves, axis=0) / ground
+
+    return Vanished(k, places, alike, left, scale, unlike)
 
 
 def _largest(first, last):
@@ -90,14 +101,27 @@ def _edges(picture):
     return np.hypot(*slopes).max(axis=2)
 
 
-def _found(frame, patch, changed):
-    """The upper left corner (2,) at which a frame (h, w, 3) is most like a patch among what changed
-    (h, w), and how much; -1 where nothing changed."""
-    alike = cv2.matchTemplate(frame, patch, cv2.TM_CCOEFF_NORMED)
-    h, w = alike.shape
+def _halves(*pictures):
+    """The left, right, upper and lower halves of pictures (h, w, ...), with the line between."""
+    h, w = pictures[0].shape[:2]
+    parts = np.s_[:, : (w + 1) // 2], np.s_[:, w // 2 :], np.s_[: (h + 1) // 2], np.s_[h // 2 :]
+    return [[np.ascontiguousarray(one[part]) for one in pictures] for part in parts]
+
+
+def _unlike(small, changed, patch, mask):
+    """How far frames (n, h, w, 3) are off a patch where they are most like it, among what changed,
+    (n,) grey levels."""
+    n, shown = 3 * max(1, mask.sum()), np.repeat(mask[..., None], 3, axis=2)
+    off = (cv2.matchTemplate(frame, patch, cv2.TM_SQDIFF, mask=shown) / n for frame in small)
+    least = [_among(c, one, patch, 255**2).min() for c, one in zip(changed, off, strict=True)]
+    return np.sqrt(np.maximum(0, least))
+
+
+def _among(changed, match, patch, other):
+    """A match (h, w) of a patch where enough of what it covers has changed, `other` elsewhere."""
+    h, w = match.shape
     share = cv2.blur(changed.astype(np.float32), patch.shape[1::-1], anchor=(0, 0))[:h, :w]
-    _, height, _, at = cv2.minMaxLoc(np.where(share >= MOVED, alike, -1).astype(np.float32))
-    return np.array(at, float), height
+    return np.where(share >= MOVED, match, np.float32(other))
 
 
 def check_seen(frames: np.ndarray, tip: np.ndarray, sure: np.ndarray) -> None:
@@ -110,7 +134,7 @@ def check_seen(frames: np.ndarray, tip: np.ndarray, sure: np.ndarray) -> None:
     if thing is None or not len(hand):
         return
     apart = np.linalg.norm(hand[0] * thing.scale - thing.places[0])
-    if apart >= BESIDE and (thing.alike[thing.left :] >= ALIKE).mean() < OFTEN:
+    if apart >= BESIDE and (thing.unlike() <= UNLIKE).mean() < OFTEN:
         raise Unusable(
             "the arm hides the object, which is gone from its place and seen nowhere else",
             "push it from behind, with the hand between it and the edge of the picture",
