@@ -343,7 +343,7 @@ def test_a_thing_that_is_touched_should_be_in_sight_unless_the_user_placed_it(
     monkeypatch.setattr(prepare.vanished, "check_seen", lambda *what: looked.append(what))
     monkeypatch.setattr(prepare, "lay", lambda tracks, scene, mirror: motion)
     monkeypatch.setattr(prepare, "unlike", lambda frames, tracks, *w: seen.append(w) or ["Hidden?"])
-    result = prepared(scene=SimpleNamespace(contact=contact))
+    result = prepared(scene=SimpleNamespace(contact=contact, hit=True))
     choices = Choices(**({name: ((5.0, 5.0, 0.1),)} if name else {}))
     assert follow(result, choices) is motion
     assert seen == ([(0.1, pytest.approx(0.3))] if asked else [])

@@ -21,6 +21,7 @@ import numpy as np
 import tasks
 from lbw_minimal import imitate, video
 from lbw_minimal.clips import arms, footage, light, screen, vanished
+from lbw_minimal.clips.behind import behind
 from lbw_minimal.clips.detector import Detector, Found, refine
 from lbw_minimal.clips.hiding import unlike
 from lbw_minimal.clips.motion import small, told
@@ -213,6 +214,8 @@ def follow(result: Prepared, choices: Choices) -> Motion:
     if unplaced:
         vanished.check_seen(*(of[seen.shot] for of in (frames, tracks.tip, tracks.tip_sure)))
     motion = lay(tracks, result.scene, choices.mirror)
+    if not choices.tip:
+        result.tracks, motion = behind(tracks, motion, result.scene, choices.mirror)
     if unplaced:
         touch, there = motion.times[[motion.contact, motion.arrival]]
         result.warnings += unlike(frames, tracks, touch, there)
