@@ -104,8 +104,8 @@ picture.</li>
 </ul>
 <p>Then, in a terminal in the kit's folder, with the path to the saved film, which most browsers put
 into Downloads; from a phone the film has to get to the computer first:</p>
-<pre><span>python -m tasks prepare {task}</span>
-<span>PATH/TO/<span id="clip">CLIP</span></span></pre>
+<pre><span>python -m tasks prepare {task}</span> <span
+>PATH/TO/<span id="clip">CLIP</span></span></pre>
 </main>
 <script>
 "use strict";
