@@ -9,6 +9,7 @@ from lbw_minimal.clips.detector import Found
 from lbw_minimal.clips.paths import Unusable
 
 N, LEAVES, THERE = 48, 12, 24  # frames: in all, and between which the thing moves
+COMES = 6  # frame in which a hand comes before the thing that it hides
 RNG = np.random.default_rng(0)
 WALL = cv2.GaussianBlur(RNG.integers(60, 120, (120, 160, 3)).astype(np.uint8), (0, 0), 4)
 THING = np.full((14, 14, 3), (220, 60, 30), np.uint8)
@@ -83,7 +84,7 @@ def test_a_thing_that_is_seen_nowhere_from_then_on_is_hidden():
     seen(film())
     for other in (None, (20, 20)):  # its like that stood there all along is another thing
         with pytest.raises(Unusable, match="hides the object, which is gone from its place"):
-            seen(film(hides=lambda t: t >= LEAVES, also=other))
+            seen(film(hides=lambda t: t >= COMES, also=other))
 
 
 @pytest.mark.parametrize("place", [(-25, 0), (8, 0), (0, -25), (0, 8)])
@@ -97,8 +98,8 @@ def test_a_thing_of_which_a_hand_covers_a_half_is_in_sight(place):
 
 @pytest.mark.parametrize(("frames", "hidden"), [(7, True), (14, False)])
 def test_a_thing_is_in_sight_if_it_is_so_in_a_quarter_of_the_frames(frames, hidden):
-    """Of the 36 or fewer after it has left."""
-    clip = film(hides=lambda t: LEAVES <= t < N - frames)
+    """Of 42, from when the hand comes."""
+    clip = film(hides=lambda t: COMES <= t < N - frames)
     clip[-3:] = clip[-4]
     if hidden:
         with pytest.raises(Unusable, match="seen nowhere else"):
@@ -107,8 +108,24 @@ def test_a_thing_is_in_sight_if_it_is_so_in_a_quarter_of_the_frames(frames, hidd
         seen(clip)
 
 
+@pytest.mark.parametrize(("frames", "hidden"), [(5, False), (6, True)])
+def test_a_hand_has_come_to_the_place_and_left_the_ground(frames, hidden):
+    """A hand that was there first, and what an arm covers in the end, are no hidden things."""
+    gone = np.repeat(WALL[None], N, 0)
+    for t in range(COMES + frames):
+        put(gone[t], HAND if t >= COMES else THING, 60, 70)
+    if hidden:
+        with pytest.raises(Unusable, match="seen nowhere else"):
+            seen(gone)
+    else:
+        seen(gone)
+    covered = film(np.full(N, 60))
+    covered[30:, 62:92, 52:82] = HAND
+    seen(covered)
+
+
 def test_what_stood_where_the_hand_was_first_is_the_hand():
-    gone = film(hides=lambda t: t >= LEAVES)
+    gone = film(hides=lambda t: t >= COMES)
     place = vanished.vanished(gone).places[0]
     for apart, raised in ((15, False), (17, True)):
         tip = np.tile(place - (apart, 0), (N, 1))
@@ -141,7 +158,7 @@ def test_the_detector_is_believed_where_it_agrees_and_where_the_thing_is_not_pus
     assert vanished.followed(film(), agrees) is agrees
     off = found(WAY + 13.0)  # six pixels beside it
     assert vanished.followed(film(), off) is not off
-    hidden = film(hides=lambda t: t >= LEAVES)
+    hidden = film(hides=lambda t: t >= COMES)
     assert vanished.followed(hidden, off) is off
     swings = film((WAY + 20 * np.sin(np.arange(N))).astype(int))
     assert vanished.followed(swings, off) is off

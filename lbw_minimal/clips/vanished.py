@@ -29,6 +29,7 @@ MOVED = 0.4  # of the pixels where it is looked for that have changed
 # 0.46 or more. A hand that pushes covers a half.
 UNLIKE, OFTEN = 0.4, 0.25
 FOLLOWED = 0.8  # correlation, in half of the frames: then its way is known
+PASSES = 6  # frames in which an arm is at its place: of hidden things it was there in 11 or more
 BESIDE = 16  # pixels of the small frames, a tenth of the picture: what is nearer may be the hand
 AGREES = 4.0, 0.8  # pixels of the small frames, share of them: the detector is believed
 
@@ -40,6 +41,7 @@ class Vanished(NamedTuple):
     places: np.ndarray  # (n, 2) pixels of the small frames
     alike: np.ndarray  # (n,) correlation with the thing as it stood; 1 while it stands
     left: int  # the first of the n in which it has left
+    covered: int  # in how many of the n something else is at its place: an arm that comes and goes
     scale: float  # pixels of the small frames in a pixel
     unlike: Callable[[], np.ndarray]  # how unlike it its most alike half is after that, (n - left,)
 
@@ -56,7 +58,9 @@ def vanished(frames: np.ndarray) -> Vanished | None:
     if thing is None:
         return None
     changed = np.abs(small - first).max(axis=3) > CHANGED  # (n, h, w)
-    stands = np.flatnonzero(changed[:, thing].mean(axis=1) < COVERED)
+    other = np.abs(small - last).max(axis=3)[:, thing] > CHANGED  # (n, pixels) than the ground
+    off = changed[:, thing].mean(axis=1)  # (n,)
+    stands, covered = np.flatnonzero(off < COVERED), np.minimum(off, other.mean(axis=1)) >= COVERED
     left = int(stands[-1]) + 1 if len(stands) else 0
     y, x = np.nonzero(thing)
     box = slice(max(0, y.min() - 1), y.max() + 2), slice(max(0, x.min() - 1), x.max() + 2)
@@ -73,7 +77,7 @@ def vanished(frames: np.ndarray) -> Vanished | None:
         halves = [_unlike(small[left:], changed[left:], *half) for half in _halves(patch, mask)]
         return np.min(halves, axis=0) / ground
 
-    return Vanished(k, places, alike, left, scale, unlike)
+    return Vanished(k, places, alike, left, int(covered.sum()), scale, unlike)
 
 
 def _largest(first, last):
@@ -126,7 +130,8 @@ def _among(changed, match, patch, other):
 
 def check_seen(frames: np.ndarray, tip: np.ndarray, sure: np.ndarray) -> None:
     """Raise Unusable where the largest thing that has left its place in the frames (T, H, W, 3)
-    uint8 of one shot is seen nowhere from then on, and is not the hand as it was first.
+    uint8 of one shot is seen nowhere from then on. It is not the hand as it was first, nor what an
+    arm covers in the end: an arm came to its place, and left the ground.
 
     tip (T, 2) pixels, sure (T,): the hand; where it is never sure nothing is asked.
     """
@@ -134,7 +139,9 @@ def check_seen(frames: np.ndarray, tip: np.ndarray, sure: np.ndarray) -> None:
     if thing is None or not len(hand):
         return
     apart = np.linalg.norm(hand[0] * thing.scale - thing.places[0])
-    if apart >= BESIDE and (thing.unlike() <= UNLIKE).mean() < OFTEN:
+    if apart < BESIDE or thing.covered < PASSES:
+        return
+    if (thing.unlike() <= UNLIKE).mean() < OFTEN:
         raise Unusable(
             "the arm hides the object, which is gone from its place and seen nowhere else",
             "push it from behind, with the hand between it and the edge of the picture",
