@@ -226,8 +226,8 @@ def coming_in(frames: np.ndarray, off: np.ndarray) -> arms.Arms:
     """The arms that come into a shot's frames, as the shipped detector sees them and by what is
     `off` the room, see `Footage`. One that rests for long is seen where something has moved."""
     model = Detector.load(EYES)
-    arm, moving = (arms.count(model.arms(n), off) for n in (frames, frames[told(frames)]))
-    return arm._replace(seen=max(arm.seen, moving.seen))
+    arm = arms.count(model.arms(frames), off)
+    return arm if arm.seen >= arms.SEEN else arms.count(model.arms(frames[told(frames)]), off)
 
 
 def look(frames: np.ndarray, cuts: Sequence[int], touched: bool) -> Found:
