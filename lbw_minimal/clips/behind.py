@@ -17,9 +17,9 @@ from lbw_minimal.clips.retarget import Motion, Scene, lay
 # Shares of the picture's width. Of 29 made films of pushes and drawers the tip is 0.016 to 0.10
 # behind the object's middle, and at most 0.025 above or below it.
 LEAST = 0.02  # a tip less far behind is on the object, or ahead of it
-BEHIND = 0.045  # how far a tip is behind, where it is mostly on the object
+BEHIND = 0.045  # how far a tip is put behind: other frames tell no better, and may be wrong too
 NEAR = 0.05  # of an object at rest: a hand that is farther off may be anywhere
-MOSTLY = 0.5  # of the frames on its way: more rarely it is a glitch, and the others tell the rest
+MOSTLY = 0.5  # of the frames on its way: more rarely it is a glitch
 
 
 def behind(
@@ -65,10 +65,8 @@ def put_behind(tracks: Tracks, touch: float, there: float) -> tuple[Tracks, floa
     on = (off @ way > -LEAST) & (moves | (np.linalg.norm(off, axis=1) < NEAR))
     share = float(on[moves].mean())
     if share > MOSTLY:  # beside it the dot is on its corner or shadow, and not on the hand
-        on, far = on | moves, -BEHIND * way
-    else:
-        far = np.median(off[moves & ~on], axis=0)
-    tip[on & moves] = (thing + width * far)[on & moves]
+        on |= moves
+    tip[on & moves] = (thing - width * BEHIND * way)[on & moves]
     lost, kept = np.flatnonzero(on & ~moves), np.flatnonzero(moves | ~on)
     for axis in (0, 1):
         tip[lost, axis] = np.interp(lost, kept, tip[kept, axis])
