@@ -331,7 +331,7 @@ def test_a_thing_that_is_touched_should_be_in_sight_unless_the_user_placed_it(
     contact, name, asked, monkeypatch
 ):
     nothing, seen = Found(np.zeros((6, 2)), np.zeros((6, 2)), np.zeros(6), np.zeros(6)), []
-    looked = []
+    looked, put = [], []
     motion = SimpleNamespace(times=np.arange(4) / 10, contact=1, arrival=3)
     monkeypatch.setattr(prepare, "look", lambda frames, cuts, touched: nothing)
     monkeypatch.setattr(prepare, "coming_in", lambda frames, off: ONE)
@@ -340,13 +340,19 @@ def test_a_thing_that_is_touched_should_be_in_sight_unless_the_user_placed_it(
     )
     monkeypatch.setattr(prepare.vanished, "check_seen", lambda *what: looked.append(what))
     monkeypatch.setattr(prepare, "lay", lambda tracks, scene, mirror: motion)
+    monkeypatch.setattr(
+        prepare, "behind", lambda tracks, *of: put.append(of) or ("put behind", of[0])
+    )
     monkeypatch.setattr(prepare, "unlike", lambda frames, tracks, *w: seen.append(w) or ["Hidden?"])
-    result = prepared(scene=SimpleNamespace(contact=contact, hit=True))
+    result = prepared(scene=SimpleNamespace(contact=contact))
     choices = Choices(**({name: ((5.0, 5.0, 0.1),)} if name else {}))
     assert follow(result, choices) is motion
     assert seen == ([(0.1, pytest.approx(0.3))] if asked else [])
     assert [[len(one) for one in what] for what in looked] == [[6, 6, 6]] * asked
     assert ("Hidden?" in result.warnings) == asked
+    # A tip that the user has placed stays there.
+    assert put == ([] if name == "tip" else [(motion, result.scene, None)])
+    assert (result.tracks == "put behind") == (name != "tip")
 
 
 @pytest.mark.parametrize("name", ["", "tip", "object"])
