@@ -2,7 +2,8 @@
 
 A hand that goes along with a thing looks like one with it, and the detector, which looks at single
 frames, then takes the thing for the end of the arm. But a hand that pushes is behind what it
-pushes. The verdict is told by what was found: a tip that is put elsewhere is no witness.
+pushes. Whether a motion can be laid is told by what was found: a tip that is put elsewhere is no
+witness. What is done again is the motion with the tips put behind.
 """
 
 from __future__ import annotations

@@ -11,8 +11,9 @@ import json
 import shlex
 import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 
@@ -66,7 +67,7 @@ class Prepared:
     film: np.ndarray = field(default_factory=no_frames)  # (N, 84, 84, 3), as `--video` reads it
     file: bytes = b""  # the same film as an mp4
     why_not: str = ""  # if the clip is not usable
-    light: str = ""  # what is poor about its light, see `light.poor`
+    light: Callable[[], str] = str  # says what is poor about its light, see `light.poor`
     notes: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
 
@@ -138,7 +139,7 @@ def prepare(name: str, path: Path, choices: Choices | None = None) -> Prepared:
             result.done = reenact(env, result.motion)
         except Unusable as error:
             on_a_screen = None if choices.placed else screen.recorded(clip.frames)
-            result.why_not = str(on_a_screen or f"{error}{result.light}")
+            result.why_not = str(on_a_screen or f"{error}{result.light()}")
             if on_a_screen:
                 result.warnings = [*clip.losses]  # no camera trembles there
             elif not result.motion and result.tracks and (said := jumps(result.tracks)):
@@ -188,12 +189,12 @@ def follow(result: Prepared, choices: Choices) -> Motion:
     seen = footage.check(frames, clip.cuts)
     frames = seen.frames
     result.clip, result.warnings = replace(clip, frames=frames), result.warnings + seen.warnings
-    result.light = light.poor(frames[seen.shot])
+    result.light = partial(light.poor, frames[seen.shot])
     arm = coming_in(frames[seen.shot], seen.off)
     if seen.still and arm.seen < arms.SEEN:
         raise Unusable(*seen.still)
     found = look(frames, clip.cuts, result.scene.contact is not None)
-    result.light = light.poor(frames[seen.shot], found.tip_sure[seen.shot])
+    result.light = partial(light.poor, frames[seen.shot], found.tip_sure[seen.shot])
     tracks = Tracks(
         clip.times, found.tip, found.object, found.tip_sure, found.object_sure,
         min(height, width), tuple(clip.cuts), arm.enters, seen.unmoved, width=width,
