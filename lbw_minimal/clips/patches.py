@@ -117,8 +117,7 @@ def mended(frames: np.ndarray, found: Found) -> tuple[Found, bool]:
     saw rests: then nothing moves. Where both go the same way the detector is believed as well, for
     a patch is known to a pixel only; but not in the frames in which it is off that way.
     """
-    k = np.unique(np.linspace(0, len(frames) - 1, LOOK_AT).round().astype(int))
-    scale = min(1.0, SMALL / max(frames.shape[1:3]))
+    k, scale = looked_at(frames)
     tip = tip_at(found, k, scale)
     side = round(min(frames.shape[1:3]) * scale)
     own = Path(found.object[k] * scale, found.object_sure[k], tip, side)
@@ -161,6 +160,12 @@ def chosen(some: list[Path]) -> Path | None:
         return max(best, key=lambda path: path.worth)
     still = [path for path in seen if path.way < MOVED]
     return max(still, key=lambda path: path.worth) if len(still) > len(some) / 2 else None
+
+
+def looked_at(frames: np.ndarray) -> tuple[np.ndarray, float]:
+    """Which (n,) of the frames (T, H, W, 3) are searched for patches, and how much smaller."""
+    k = np.unique(np.linspace(0, len(frames) - 1, LOOK_AT).round().astype(int))
+    return k, min(1.0, SMALL / max(frames.shape[1:3]))
 
 
 def shrunk(frames: np.ndarray, scale: float) -> list[np.ndarray]:

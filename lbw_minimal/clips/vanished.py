@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 
 from lbw_minimal.clips.detector import Found
-from lbw_minimal.clips.patches import CHANGED, LOOK_AT, SMALL, Path, shrunk, tip_at
+from lbw_minimal.clips.patches import CHANGED, Path, looked_at, shrunk, tip_at
 from lbw_minimal.clips.paths import SURE, Unusable
 
 ENDS = 16  # a shot's first and last frames are so many of it
@@ -49,8 +49,7 @@ class Vanished(NamedTuple):
 def vanished(frames: np.ndarray) -> Vanished | None:
     """The largest thing that has left its place in the frames (T, H, W, 3) uint8 of one shot, or
     None."""
-    k = np.unique(np.linspace(0, len(frames) - 1, LOOK_AT).round().astype(int))
-    scale = min(1.0, SMALL / max(frames.shape[1:3]))
+    k, scale = looked_at(frames)
     small = np.stack(shrunk(frames[k], scale))
     few = max(1, len(small) // ENDS)
     first, last = (np.median(part, axis=0) for part in (small[:few], small[-few:]))
