@@ -47,7 +47,7 @@ pre { white-space: pre-wrap; overflow-wrap: anywhere; background: var(--panel);
 @media print { nav, .scene, iframe { display: none } .still { display: block }
                body { font-size: .85rem; padding: 0 } h2 { margin-top: 1.2rem }
                h1, h2, h2 + p, p:has(+ pre), p:has(+ img) { break-after: avoid }
-               p, li, pre, h2, figure, img, tr { break-inside: avoid }
+               p, li, pre, h2, figure, img, tr, table { break-inside: avoid }
                img { max-height: 9cm; max-width: 100% } }
 """
 
