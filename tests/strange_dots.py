@@ -8,7 +8,6 @@ count from when the object moves until it rests, where a reach has none while th
 is off by its median there, as a share of the picture's width.
 """
 
-import argparse
 import tempfile
 from collections.abc import Iterator
 from itertools import pairwise
@@ -21,7 +20,7 @@ from lbw_minimal.clips import camera
 from lbw_minimal.clips.footage import TREMBLES
 from lbw_minimal.clips.paths import Tracks, busiest_piece, low_pass, of_a_hand, trusted
 from lbw_minimal.clips.reader import read_clip
-from tests.strangers import Stranger, stranger
+from tests.strangers import Stranger, asked, stranger
 
 RIGHT = 0.05  # of the width: what is farther off is on something else
 MOVES = 0.02, 0.98  # of its way: before it rests, and after
@@ -107,15 +106,10 @@ def taken(seed: int, count: int, made: str) -> Iterator[tuple[int, Stranger, Dot
 
 def main() -> None:
     """Print how far each clip's dots are off, and how many are right."""
-    p = argparse.ArgumentParser()
-    p.add_argument("--seed", type=int, default=84)
-    p.add_argument("--count", type=int, default=60)
-    p.add_argument("--made", choices=("either", "filmed", "painted"), default="either")
-    args = p.parse_args()
     from lbw_minimal.report import wilson
 
     dots = []
-    for i, one, dot in taken(args.seed, args.count, args.made):
+    for i, one, dot in taken(*asked(seed=84)):
         said = "right" if dot.right else "WRONG"
         print(f"{i:3d} {said} {one.made} {one.task}: tip {dot.tip:.3f}, object {dot.object:.3f}, "
               f"swapped in {dot.swapped:.0%}", flush=True)  # fmt: skip

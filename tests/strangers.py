@@ -160,16 +160,21 @@ def trial(seed: int, count: int, made: str = "either", show=print) -> list[tuple
     return out
 
 
-def main() -> None:
-    """Print each verdict, and how many are right."""
+def asked(seed: int) -> tuple[int, int, str]:
+    """Which clips the command line asks for: seed, `seed` if there is none, count, and `made`."""
     p = argparse.ArgumentParser()
-    p.add_argument("--seed", type=int, default=1)
+    p.add_argument("--seed", type=int, default=seed)
     p.add_argument("--count", type=int, default=60)
     p.add_argument("--made", choices=("either", "filmed", "painted"), default="either")
     args = p.parse_args()
+    return args.seed, args.count, args.made
+
+
+def main() -> None:
+    """Print each verdict, and how many are right."""
     from lbw_minimal.report import wilson
 
-    told = trial(args.seed, args.count, args.made)
+    told = trial(*asked(seed=1))
     right = sum(judged(*pair) for pair in told)
     low, high = wilson(right, len(told))
     print(f"{right} of {len(told)} verdicts right, 95 % interval {low:.2f} to {high:.2f}")

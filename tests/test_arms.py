@@ -6,6 +6,7 @@ from toy_clips import arm, room
 
 from lbw_minimal.clips import arms
 from lbw_minimal.clips.detector import Detector
+from lbw_minimal.clips.motion import some
 from tasks.commands.prepare import EYES
 
 H, W = 32, 42  # cells
@@ -184,7 +185,7 @@ def test_an_arm_comes_in_beside_something_larger_that_does_not():
 @pytest.fixture(scope="module")
 def shown():
     detector = Detector.load(EYES)
-    return lambda frames: arms.count(detector.arms(frames), ROOM)
+    return lambda frames: arms.count(some(detector.look(frames).arms), ROOM)
 
 
 FROM_LEFT = arm(np.clip(np.linspace(0, 0.6, 24), 0, 0.45))
@@ -216,11 +217,11 @@ def test_what_moves_alone_is_no_arm_to_the_detector(shown):
 
 def test_masks_are_those_of_the_picture_without_the_black_bars_around_it():
     detector = Detector.load(EYES)
-    wide = detector.arms(np.repeat(FROM_LEFT, 3, 0))
+    wide = detector.look(np.repeat(FROM_LEFT, 3, 0)).arms
     assert wide.shape == (
-        60,
+        72,
         *(round(42 * side / max(FROM_LEFT.shape[1:3])) for side in FROM_LEFT.shape[1:3]),
     )
-    upright = detector.arms(np.rot90(FROM_LEFT, axes=(1, 2)).copy())
+    upright = detector.look(np.rot90(FROM_LEFT, axes=(1, 2)).copy()).arms
     assert upright.shape == (24, *wide.shape[:0:-1])
     assert wide.min() >= 0 and 0.9 < wide.max() <= 1

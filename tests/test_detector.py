@@ -184,7 +184,7 @@ def test_a_cut_is_followed_at_once():
 def test_looking_both_ways_mirrors_the_maps_back():
     frames = np.zeros((1, 84, 84, 12), np.uint8)
     frames[:, 40:44, 10:14] = 255
-    place, _ = read(both_ways(Bright(), to_images(frames)))
+    place, _ = read(both_ways(Bright(), to_images(frames))[0])
     assert torch.allclose(place[0, 0], torch.tensor([12.0, 42.0]), atol=0.5)
 
 
@@ -193,7 +193,8 @@ def test_looking_both_ways_is_a_mean_and_no_surer_than_either_look():
     frames = np.zeros((1, 84, 84, 12), np.uint8)
     frames[:, 40:44, 10:14] = 255
     images = to_images(frames)
-    torch.testing.assert_close(both_ways(Bright(), images), Bright()(images)[0])
+    for both, one in zip(both_ways(Bright(), images), Bright()(images), strict=True):
+        torch.testing.assert_close(both, one)
 
 
 def test_a_lone_frame_is_its_own_witness_and_counts_by_its_root():
@@ -308,7 +309,7 @@ class Bright(torch.nn.Module):
         spot = torch.nn.functional.avg_pool2d(images[:, :3].mean(1, keepdim=True), 2).flatten(2)
         logits = torch.cat([20 * spot, torch.zeros_like(spot)], 1)
         last = torch.tensor([0.0, 50.0]).expand(len(images), 2)[..., None]
-        return torch.cat([logits, last], 2), None
+        return torch.cat([logits, last], 2), images[:, :2, ::2, ::2]
 
 
 @pytest.mark.parametrize("shape", [(84, 84), (120, 200), (300, 170), (40, 56)])
@@ -364,10 +365,10 @@ def test_places_come_back_by_the_scale_of_each_axis(monkeypatch):
     places = torch.tensor([[[42.0, 42.0], [84.0, 44.0]]] * 2)
     looks = []
     monkeypatch.setattr(
-        detector, "both_ways", lambda network, images: looks.append(len(images)) or images
+        detector, "both_ways", lambda network, images: looks.append(len(images)) or [images] * 2
     )
     monkeypatch.setattr(detector, "read", lambda logits: (places, torch.ones(2, 2)))
-    found, sure = Detector(Network())._look(np.zeros((2, 10, 200, 3), np.uint8))
+    found, sure, _ = Detector(Network()).look(np.zeros((2, 10, 200, 3), np.uint8))
     np.testing.assert_allclose(found[0], [[100, 5], [200, 10]], rtol=1e-5)
     assert (sure == 1).all() and looks == [2]  # and in the mirror
 
@@ -408,12 +409,12 @@ class TwoLooks(Detector):
         self.looks, self.second = [], (place, sure)
         self.near = np.array(near_sure)
 
-    def _look(self, frames):
+    def look(self, frames):
         self.looks.append(frames.shape)
         if len(self.looks) == 1:
-            return self.second
+            return *self.second, None
         n = len(frames)
-        return np.tile(np.float32([5, 6]), (n, 2, 1)), np.tile(self.near, (n, 1))
+        return np.tile(np.float32([5, 6]), (n, 2, 1)), np.tile(self.near, (n, 1)), None
 
 
 def test_the_closer_look_counts_where_it_is_surer_and_in_the_clips_pixels():

@@ -187,11 +187,13 @@ def found(T, width):
 def test_a_clip_is_searched_with_its_marks_and_its_shorter_side_as_it_was(monkeypatch, golden):
     frames, laid = arm(np.linspace(0, 0.8, 40)), []
     clip = Clip(frames, 1.0 + np.arange(40) / 20, [], [])
-    monkeypatch.setattr(prepare, "look", lambda frames, cuts, touched: found(len(frames), 160))
+    monkeypatch.setattr(
+        prepare, "look", lambda sights, frames, cuts, touched: found(len(frames), 160)
+    )
     monkeypatch.setattr(prepare, "lay", lambda *what: laid.append(what))
     monkeypatch.setattr(prepare.footage, "check", lambda frames, cuts: Footage(
-        255 - frames, ["It trembles."], slice(None), None, True))  # fmt: skip
-    monkeypatch.setattr(prepare, "coming_in", lambda frames, off: Arms(1.0, 0.0, 0.3, True, 0.0))
+        255 - frames, ["It trembles."], slice(0, 40), None, True))  # fmt: skip
+    monkeypatch.setattr(prepare, "coming_in", lambda sight, off: Arms(1.0, 0.0, 0.3, True, 0.0))
     scene = SimpleNamespace(contact=0.04, name="scene")
     result = prepare.Prepared(clip, scene, warnings=["read"])
     marks = Choices(tip=((30.0, 40.0, 1.2), (50.0, 60.0, 1.5)), object=((90.0, 60.0, 2.0),))

@@ -51,7 +51,7 @@ def a_short_film(monkeypatch):
 @pytest.fixture
 def eyes(filmed, monkeypatch):
     """A detector that is told the truth; what it says can be set."""
-    monkeypatch.setattr(prepare, "look", lambda frames, cuts, touched: eyes.found)
+    monkeypatch.setattr(prepare, "look", lambda sights, frames, cuts, touched: eyes.found)
     eyes.found = filmed[1]
     return eyes
 
@@ -287,14 +287,16 @@ def test_what_was_found_is_laid_by_the_clips_shorter_side_cuts_and_marks(monkeyp
     clip = Clip(np.zeros((n, 90, 160, 3), np.uint8), 2 + np.arange(n) / 20, [4], [])
     nothing = Found(np.zeros((n, 2)), np.zeros((n, 2)), np.zeros(n), np.zeros(n))
     touches = []
-    monkeypatch.setattr(prepare, "look", lambda *asked: touches.append(asked[2]) or nothing)
+    monkeypatch.setattr(prepare, "look", lambda *asked: touches.append(asked[3]) or nothing)
     monkeypatch.setattr(
         prepare.footage,
         "check",
-        lambda frames, cuts: Footage(frames, [f"cut at {cuts}"], slice(1, 4), None, True),
+        lambda frames, cuts: Footage(frames, [f"cut at {cuts}"], slice(0, 4), None, True),
     )
     arm, shots = Arms(1.0, 0.0, 0.2, True, 0.0), []
-    monkeypatch.setattr(prepare, "coming_in", lambda frames, off: shots.append(len(frames)) or arm)
+    monkeypatch.setattr(
+        prepare, "coming_in", lambda sight, off: shots.append(len(sight.frames)) or arm
+    )
     monkeypatch.setattr(
         prepare,
         "lay",
@@ -307,7 +309,7 @@ def test_what_was_found_is_laid_by_the_clips_shorter_side_cuts_and_marks(monkeyp
     tracks = laid["tracks"]
     assert (tracks.side, tracks.cuts, laid["scene"], laid["mirror"]) == (90, (4,), scene, True)
     assert tracks.tip[2].tolist() == [10, 20] and tracks.object[4].tolist() == [30, 40]
-    assert (tracks.enters, tracks.unmoved, shots) == (0.2, True, [3])
+    assert (tracks.enters, tracks.unmoved, shots) == (0.2, True, [4])
     assert result.warnings == ["cut at [4]"] and result.tracks is tracks
     assert result.notes[0] == "You placed the tip in 1 picture and the object in 1 picture."
     assert result.notes[1].startswith("6 frames at 20 a second")

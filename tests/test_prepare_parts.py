@@ -6,6 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from lbw_minimal.clips import sight
 from lbw_minimal.clips.arms import Arms
 from lbw_minimal.clips.detector import Found
 from lbw_minimal.clips.footage import Footage
@@ -160,25 +161,31 @@ def test_a_run_on_a_clip_says_what_is_odd_about_it_or_why_it_is_none(tmp_path, m
         prepare.usable("push", tmp_path)
 
 
-def test_patches_mend_what_the_shipped_detector_finds_and_corners_refine_it(monkeypatch):
+def test_patches_mend_what_a_detector_finds_in_each_shot_and_corners_refine_it(monkeypatch):
     """Two frames, with a cut between them: the detector sees each shot by itself."""
     frames = np.arange(2, dtype=np.uint8)[:, None, None, None] + np.zeros((1, 84, 84, 3), np.uint8)
 
-    def detector(path):
-        assert path.name == "eyes.safetensors"
-        return SimpleNamespace(detect=lambda seen: Found(*[seen[:, 0, 0, 0] + 10 * len(seen)] * 4))
+    def detect(seen, first):
+        return Found(*[seen[:, 0, 0, 0] + 10 * len(seen)] * 4)
 
     def mended(seen, found):  # each time by 100 and the shot's frames
         return replace(found, object=found.object + 100 + len(seen)), True
 
-    monkeypatch.setattr(prepare, "Detector", SimpleNamespace(load=detector))
     monkeypatch.setattr(prepare, "mended", mended)
     monkeypatch.setattr(prepare, "gone", lambda found: 0.0)
     monkeypatch.setattr(prepare, "refine", lambda seen, found, cuts: (cuts, seen is frames, found))
-    cuts, same, found = prepare.look(frames, [1], True)
+    model = SimpleNamespace(look=lambda seen: None, detect=detect)
+    cuts, same, found = prepare.look(sight.shots(model, frames, [1]), frames, [1], True)
     assert cuts == [1] and same
     assert found.tip.tolist() == [10, 11] and found.object.tolist() == [111, 112]
-    assert prepare.look(frames, [], True)[2].object.tolist() == [122, 123]
+    found = prepare.look(sight.shots(model, frames, []), frames, [], True)[2]
+    assert found.object.tolist() == [122, 123]
+
+
+def seen_by(detect, frames):
+    """A shot's frames as a model sees them that detects by `detect`, whatever its first look."""
+    model = SimpleNamespace(look=lambda seen: None, detect=lambda seen, first: detect(seen))
+    return sight.Sight(model, frames)
 
 
 WHOLE, MOVING = [50, 51, 52, 53, 54], [20, 20, 20, 21, 21]
@@ -202,9 +209,9 @@ def test_the_surer_look_counts_and_for_a_hand_that_touches_nothing_the_one_at_wh
         return Found(*[np.arange(n) + 10 * n] * 2, *sure)
 
     monkeypatch.setattr(prepare, "mended", lambda frames, found: (found, True))
-    monkeypatch.setattr(prepare.vanished, "followed", lambda frames, found: found)
+    monkeypatch.setattr(prepare.vanished, "followed", lambda thing, frames, found: found)
     monkeypatch.setattr(prepare, "gone", lambda found: 0.0)
-    found = prepare.looked(SimpleNamespace(detect=detect), frames, touched)
+    found = prepare.looked(seen_by(detect, frames), touched)
     assert found.tip.tolist() == tip and found.object.tolist() == thing
     assert found.tip_sure[0] == (0.9 if touched else 0.54) and found.object_sure[0] == 0.9
 
@@ -235,11 +242,11 @@ def test_of_what_patches_make_of_the_looks_the_object_is_pushed_or_else_goes_far
         return Found(*[np.full(n, 10 * n)] * 2, np.full(n, 0.9 - 0.1 * n), np.full(n, 0.5))
 
     monkeypatch.setattr(prepare, "mended", mended)
-    monkeypatch.setattr(prepare.vanished, "followed", lambda frames, found: found)
+    monkeypatch.setattr(prepare.vanished, "followed", lambda thing, frames, found: found)
     monkeypatch.setattr(prepare, "gone", lambda found: ways[found.object[0]])
     frames = np.zeros((5, 84, 84, 3), np.uint8)
     frames[:3, 40:50, 20:30] = frames[3:, 40:50, 50:60] = 200
-    found = prepare.looked(SimpleNamespace(detect=detect), frames, touched)
+    found = prepare.looked(seen_by(detect, frames), touched)
     assert found.object.tolist() == [object_] * 5
     assert found.tip.tolist() == [20] * 5  # the look at the two frames is surer
 
@@ -250,16 +257,17 @@ def test_what_has_left_its_place_may_be_the_object_where_one_is_touched(touched,
         n = len(seen)
         return Found(np.zeros((n, 2)), np.zeros((n, 2)), np.full(n, 0.9), np.full(n, 0.9))
 
-    def followed(seen, found):
-        assert seen is frames
+    def followed(thing, seen, found):
+        assert thing == "vanished" and seen is frames
         return replace(found, object=found.object + 7)
 
-    monkeypatch.setattr(prepare, "told", lambda frames: np.arange(2))
+    monkeypatch.setattr(sight, "vanished", lambda frames: "vanished")
+    monkeypatch.setattr(sight, "told", lambda frames: np.arange(2))
     monkeypatch.setattr(prepare, "mended", lambda frames, found: (found, True))
     monkeypatch.setattr(prepare, "reaching", lambda frames, found: found)
     monkeypatch.setattr(prepare.vanished, "followed", followed)
     frames = np.zeros((10, 84, 84, 3), np.uint8)
-    found = prepare.looked(SimpleNamespace(detect=detect), frames, touched)
+    found = prepare.looked(seen_by(detect, frames), touched)
     assert found.object[0, 0] == (7 if touched else 0)
 
 
@@ -271,13 +279,51 @@ def test_an_arm_that_is_rarely_seen_is_looked_for_where_something_moves(seen, re
 
     def count(masks, moved):
         assert moved is off
-        return {10: whole, 2: moving}[masks]
+        return {10: whole, 2: moving}[len(masks)]
 
-    monkeypatch.setattr(prepare, "Detector", SimpleNamespace(
-        load=lambda path: SimpleNamespace(arms=len)))  # fmt: skip
-    monkeypatch.setattr(prepare, "told", lambda frames: np.array([0, 6]))
+    model = SimpleNamespace(look=lambda seen: SimpleNamespace(arms=seen))
+    monkeypatch.setattr(sight, "told", lambda frames: np.array([0, 6]))
     monkeypatch.setattr(prepare.arms, "count", count)
-    assert prepare.coming_in(frames, off) is (moving if rests else whole)
+    assert prepare.coming_in(sight.Sight(model, frames), off) is (moving if rests else whole)
+
+
+def test_the_shipped_detector_is_loaded_once_and_looks_once_at_a_frame_for_all_that_ask(
+    monkeypatch,
+):
+    """At all frames, and at those in which something has moved: arms, tip and object are told by
+    the same two looks, of which the closer ones are the detector's own affair."""
+    asked, compared = [], []
+
+    def look(seen):
+        asked.append(len(seen))
+        return SimpleNamespace(arms=seen)
+
+    def detect(seen, first):
+        assert (first.arms == seen).all()
+        return Found(*[np.zeros((len(seen), 2))] * 2, *[np.zeros(len(seen))] * 2)
+
+    def check_seen(thing, tip, sure):
+        raise Unusable("hidden", "film it")
+
+    def load(path):
+        assert path.name == "eyes.safetensors"
+        asked.append("loaded")
+        return SimpleNamespace(look=look, detect=detect)
+
+    monkeypatch.setattr(prepare, "Detector", SimpleNamespace(load=load))
+    monkeypatch.setattr(prepare.arms, "count", lambda masks, off: ONE._replace(seen=0.0))
+    monkeypatch.setattr(prepare.footage, "check", lambda frames, cuts: Footage(
+        frames, [], slice(0, 6), None, False))  # fmt: skip
+    monkeypatch.setattr(sight, "told", lambda frames: asked.append("told") or np.arange(2))
+    monkeypatch.setattr(sight, "vanished", lambda frames: compared.append(len(frames)))
+    monkeypatch.setattr(prepare, "mended", lambda frames, found: (found, True))
+    monkeypatch.setattr(prepare, "gone", lambda found: 0.0)
+    monkeypatch.setattr(prepare.vanished, "followed", lambda thing, frames, found: found)
+    monkeypatch.setattr(prepare.vanished, "check_seen", check_seen)
+    scene = SimpleNamespace(contact=0.04)
+    with pytest.raises(Unusable, match="hidden"):
+        follow(prepared(clip=replace(clip(10), cuts=[6]), scene=scene), Choices())
+    assert asked == ["loaded", 6, "told", 2, 4, "told", 2] and compared == [6, 4]
 
 
 @pytest.mark.parametrize("touched", [False, True])
@@ -290,11 +336,11 @@ def test_a_hand_that_touches_nothing_may_be_told_by_its_outline(touched, monkeyp
         assert seen is frames
         return replace(found, tip=found.tip + 1)
 
-    monkeypatch.setattr(prepare, "told", lambda frames: np.arange(2))
+    monkeypatch.setattr(sight, "told", lambda frames: np.arange(2))
     monkeypatch.setattr(prepare, "mended", lambda frames, found: (found, True))
     monkeypatch.setattr(prepare, "reaching", outline)
     frames = np.zeros((10, 84, 84, 3), np.uint8)
-    found = prepare.looked(SimpleNamespace(detect=detect), frames, touched)
+    found = prepare.looked(seen_by(detect, frames), touched)
     assert found.tip[0, 0] == (10 if touched else 2 + 1)
 
 
@@ -308,10 +354,10 @@ def test_a_hand_that_touches_nothing_may_be_told_by_its_outline(touched, monkeyp
 def test_a_mark_lies_in_the_picture_and_in_the_clips_seconds(mark, inside, monkeypatch):
     """Six frames of 160x90 from 2 s on; the page rounds, so a hundredth of a second is let pass."""
     nothing = Found(np.zeros((6, 2)), np.zeros((6, 2)), np.zeros(6), np.zeros(6))
-    monkeypatch.setattr(prepare, "look", lambda frames, cuts, touched: nothing)
-    monkeypatch.setattr(prepare, "coming_in", lambda frames, off: ONE)
+    monkeypatch.setattr(prepare, "look", lambda sights, frames, cuts, touched: nothing)
+    monkeypatch.setattr(prepare, "coming_in", lambda sight, off: ONE)
     monkeypatch.setattr(
-        prepare.footage, "check", lambda frames, cuts: Footage(frames, [], slice(None), None, False)
+        prepare.footage, "check", lambda frames, cuts: Footage(frames, [], slice(0, 6), None, False)
     )
     monkeypatch.setattr(prepare, "lay", lambda tracks, scene, mirror: "laid")
     for name in ("tip", "object"):
@@ -332,11 +378,12 @@ def test_a_thing_that_is_touched_should_be_in_sight_unless_the_user_placed_it(
 ):
     nothing, seen = Found(np.zeros((6, 2)), np.zeros((6, 2)), np.zeros(6), np.zeros(6)), []
     looked, put = [], []
+    monkeypatch.setattr(sight, "vanished", len)
     motion = SimpleNamespace(times=np.arange(4) / 10, contact=1, arrival=3)
-    monkeypatch.setattr(prepare, "look", lambda frames, cuts, touched: nothing)
-    monkeypatch.setattr(prepare, "coming_in", lambda frames, off: ONE)
+    monkeypatch.setattr(prepare, "look", lambda sights, frames, cuts, touched: nothing)
+    monkeypatch.setattr(prepare, "coming_in", lambda sight, off: ONE)
     monkeypatch.setattr(
-        prepare.footage, "check", lambda frames, cuts: Footage(frames, [], slice(None), None, False)
+        prepare.footage, "check", lambda frames, cuts: Footage(frames, [], slice(0, 6), None, False)
     )
     monkeypatch.setattr(prepare.vanished, "check_seen", lambda *what: looked.append(what))
     monkeypatch.setattr(prepare, "lay", lambda tracks, scene, mirror: motion)
@@ -348,7 +395,7 @@ def test_a_thing_that_is_touched_should_be_in_sight_unless_the_user_placed_it(
     choices = Choices(**({name: ((5.0, 5.0, 0.1),)} if name else {}))
     assert follow(result, choices) is motion
     assert seen == ([(0.1, pytest.approx(0.3))] if asked else [])
-    assert [[len(one) for one in what] for what in looked] == [[6, 6, 6]] * asked
+    assert [(thing, len(tip), len(sure)) for thing, tip, sure in looked] == [(6, 6, 6)] * asked
     assert ("Hidden?" in result.warnings) == asked
     # A tip that the user has placed stays there.
     assert put == ([] if name == "tip" else [(motion, result.scene, None)])
@@ -359,10 +406,10 @@ def test_a_thing_that_is_touched_should_be_in_sight_unless_the_user_placed_it(
 def test_a_user_who_places_the_tip_overrules_that_there_is_no_arm(name, monkeypatch):
     """It is searched all the same, so that the page shows what was found and can be corrected."""
     nothing = Found(np.zeros((6, 2)), np.zeros((6, 2)), np.zeros(6), np.zeros(6))
-    monkeypatch.setattr(prepare, "look", lambda frames, cuts, touched: nothing)
-    monkeypatch.setattr(prepare, "coming_in", lambda frames, off: NONE)
+    monkeypatch.setattr(prepare, "look", lambda sights, frames, cuts, touched: nothing)
+    monkeypatch.setattr(prepare, "coming_in", lambda sight, off: NONE)
     monkeypatch.setattr(
-        prepare.footage, "check", lambda frames, cuts: Footage(frames, [], slice(None), None, False)
+        prepare.footage, "check", lambda frames, cuts: Footage(frames, [], slice(0, 6), None, False)
     )
     monkeypatch.setattr(prepare, "lay", lambda tracks, scene, mirror: "laid")
     result = prepared()
@@ -383,13 +430,13 @@ def test_a_user_who_places_the_tip_overrules_that_there_is_no_arm(name, monkeypa
 @pytest.mark.parametrize(("arms", "refused"), [(NONE, True), (ONE, False)])
 def test_where_nothing_seems_to_move_an_arm_that_is_seen_does(arms, refused, monkeypatch):
     nothing = Found(np.zeros((6, 2)), np.zeros((6, 2)), np.zeros(6), np.zeros(6))
-    monkeypatch.setattr(prepare, "look", lambda frames, cuts, touched: nothing)
-    monkeypatch.setattr(prepare, "coming_in", lambda frames, off: arms)
+    monkeypatch.setattr(prepare, "look", lambda sights, frames, cuts, touched: nothing)
+    monkeypatch.setattr(prepare, "coming_in", lambda sight, off: arms)
     still = "nothing moves", "film an arm"
     monkeypatch.setattr(
         prepare.footage,
         "check",
-        lambda frames, cuts: Footage(frames, [], slice(None), None, True, still),
+        lambda frames, cuts: Footage(frames, [], slice(0, 6), None, True, still),
     )
     monkeypatch.setattr(prepare, "lay", lambda tracks, scene, mirror: "laid")
     result, marks = prepared(), Choices(tip=((5.0, 5.0, 0.1),))
@@ -405,9 +452,9 @@ def test_where_nothing_seems_to_move_an_arm_that_is_seen_does(arms, refused, mon
 def test_a_refused_clip_is_told_what_is_poor_about_its_light(light, monkeypatch):
     """It is measured once the camera stands, in the shot that is asked."""
     asked, still = [], ("nothing moves", "record it all")
-    monkeypatch.setattr(prepare, "read_clip", lambda path, **more: clip())
+    monkeypatch.setattr(prepare, "read_clip", lambda path, **more: replace(clip(), cuts=[2]))
     monkeypatch.setattr(prepare, "is_own", lambda *what: False)
-    monkeypatch.setattr(prepare, "coming_in", lambda frames, off: NONE)
+    monkeypatch.setattr(prepare, "coming_in", lambda sight, off: NONE)
     monkeypatch.setattr(
         prepare.footage,
         "check",
@@ -418,8 +465,8 @@ def test_a_refused_clip_is_told_what_is_poor_about_its_light(light, monkeypatch)
     assert result.why_not == f"nothing moves; record it all.{light}"
     assert [len(frames) for (frames,) in asked] == [4]
     found = Found(np.zeros((6, 2)), np.zeros((6, 2)), np.arange(6), np.zeros(6))
-    monkeypatch.setattr(prepare, "coming_in", lambda frames, off: ONE)
-    monkeypatch.setattr(prepare, "look", lambda frames, cuts, touched: found)
+    monkeypatch.setattr(prepare, "coming_in", lambda sight, off: ONE)
+    monkeypatch.setattr(prepare, "look", lambda sights, frames, cuts, touched: found)
     result = prepare.prepare("push", "a.mp4")
     assert result.why_not == f"{FEW}{light}" and asked[-1][1].tolist() == [2, 3, 4, 5]
 

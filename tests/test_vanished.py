@@ -77,7 +77,7 @@ TIP = np.tile([20.0, 20.0], (N, 1))
 
 
 def seen(frames, tip=TIP, sure=0.9):
-    vanished.check_seen(frames, tip, np.broadcast_to(sure, N))
+    vanished.check_seen(vanished.vanished(frames), tip, np.broadcast_to(sure, N))
 
 
 def test_a_thing_that_is_seen_nowhere_from_then_on_is_hidden():
@@ -146,20 +146,24 @@ def found(x, y=77.0):
     return Found(tip, np.stack([x, np.broadcast_to(y, N)], 1), np.full(N, 0.9), np.full(N, 0.7))
 
 
+def followed(frames, found):
+    return vanished.followed(vanished.vanished(frames), frames, found)
+
+
 def test_a_thing_that_is_pushed_from_its_place_is_the_object():
     before = found(WAY + 7.0, 40)
-    told = vanished.followed(film(), before)
+    told = followed(film(), before)
     assert np.abs(told.object - np.stack([WAY + 7, np.full(N, 77)], 1))[LEAVES + 8 :].max() <= 1.5
     assert told.object_sure.min() > 0.5 and told.tip is before.tip
 
 
 def test_the_detector_is_believed_where_it_agrees_and_where_the_thing_is_not_pushed_or_hidden():
     agrees = found(WAY + 9.0)
-    assert vanished.followed(film(), agrees) is agrees
+    assert followed(film(), agrees) is agrees
     off = found(WAY + 13.0)  # six pixels beside it
-    assert vanished.followed(film(), off) is not off
+    assert followed(film(), off) is not off
     hidden = film(hides=lambda t: t >= COMES)
-    assert vanished.followed(hidden, off) is off
+    assert followed(hidden, off) is off
     swings = film((WAY + 20 * np.sin(np.arange(N))).astype(int))
-    assert vanished.followed(swings, off) is off
-    assert vanished.followed(film(np.full(N, 60)), off) is off
+    assert followed(swings, off) is off
+    assert followed(film(np.full(N, 60)), off) is off

@@ -3,7 +3,7 @@
 There are two witnesses. The detector was taught where arms are in drawings, and sees one that
 hardly moves; of some it is never sure. What moves in over an edge is an arm mostly, and sometimes a
 lamp. One of them is enough to believe in an arm, or in two.
-In: masks (n, h, w) of some of a shot's frames, as `Detector.arms` gives them: how sure each cell
+In: masks (n, h, w) of some of a shot's frames, as `Detector.look` gives them: how sure each cell
 shows an arm, 0 to 1. A cell is two pixels wide in a picture whose longer side has 84. And how much
 each pixel of some frames is off the room, (T, 84, 84).
 """

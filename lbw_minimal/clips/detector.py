@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -23,10 +24,9 @@ from torch import nn
 from torch.utils.data import DataLoader, Dataset
 
 from lbw_minimal.clips.corners import followed
-from lbw_minimal.clips.detector_networks import Network, both_ways, loss, masks_both_ways, read
+from lbw_minimal.clips.detector_networks import Network, both_ways, loss, read
 from lbw_minimal.clips.drawings import draw_clip
 from lbw_minimal.clips.drawn_shapes import SIZE
-from lbw_minimal.clips.motion import some
 from lbw_minimal.images import median_frame, to_images
 from lbw_minimal.training import (
     Checkpoint,
@@ -65,14 +65,40 @@ class Found:
     object_sure: np.ndarray  # (T,) float32
 
 
+class Look(NamedTuple):
+    """What the network says of T frames, in one pass."""
+
+    place: np.ndarray  # (T, 2, 2) pixels: of tip and object, x and y
+    sure: np.ndarray  # (T, 2) 0 to 1
+    # (T, h, w) 0 to 1: how sure each cell shows an arm. It is two pixels wide where the longer side
+    # has 84.
+    arms: np.ndarray
+
+
 class Detector:
     """Finds tip and object in clips, with a network that `train` taught."""
 
     def __init__(self, network: Network):
         self.network = network.eval().requires_grad_(False)
 
-    def detect(self, frames: np.ndarray) -> Found:
+    def detect(self, frames: np.ndarray, first: Look | None = None) -> Found:
         """Tip and object in the frames (T, H, W, 3) uint8 of one clip with a still camera.
+
+        first: the look at all of them, if it has been taken. Raises InputError for frames of
+        another shape or type.
+        """
+        place, sure, _ = first or self.look(frames)
+        left, top, side = _closer(place, sure, frames.shape[1:3])
+        if side < CLOSER * max(frames.shape[1:3]):
+            near, near_sure, _ = self.look(frames[:, top : top + side, left : left + side])
+            better = (near_sure > SURE) | (near_sure > sure)
+            place = np.where(better[..., None], near + np.array([left, top], np.float32), place)
+            sure = np.where(better, near_sure, sure)
+        return Found(place[:, 0], place[:, 1], sure[:, 0], sure[:, 1])
+
+    @torch.inference_mode()
+    def look(self, frames: np.ndarray) -> Look:
+        """One look at the frames (T, H, W, 3) uint8 of one clip with a still camera.
 
         Raises InputError for frames of another shape or type.
         """
@@ -80,41 +106,18 @@ class Detector:
             raise InputError(
                 f"frames are {frames.shape} {frames.dtype}; give a clip, (T, H, W, 3) uint8."
             )
-        place, sure = self._look(frames)
-        left, top, side = _closer(place, sure, frames.shape[1:3])
-        if side < CLOSER * max(frames.shape[1:3]):
-            near, near_sure = self._look(frames[:, top : top + side, left : left + side])
-            better = (near_sure > SURE) | (near_sure > sure)
-            place = np.where(better[..., None], near + np.array([left, top], np.float32), place)
-            sure = np.where(better, near_sure, sure)
-        return Found(place[:, 0], place[:, 1], sure[:, 0], sure[:, 1])
-
-    @torch.inference_mode()
-    def arms(self, frames: np.ndarray) -> np.ndarray:
-        """How sure each cell shows an arm, (n, h, w) float32, 0 to 1, in at most 60 of the frames.
-
-        frames (T, H, W, 3) uint8: one shot. A cell is two pixels wide where the longer side has 84.
-        """
-        small, scale, (left, top) = _fitted(frames)
-        device = next(self.network.parameters()).device
-        images = to_images(with_references(some(small), references(small)), device)
-        right, bottom = (left, top) + scale * frames.shape[2:0:-1]
-        rows, columns = (
-            slice(round(a / 2), round(b / 2)) for a, b in ((top, bottom), (left, right))
-        )
-        return masks_both_ways(self.network, images)[:, 0, rows, columns].cpu().numpy()
-
-    @torch.inference_mode()
-    def _look(self, frames):
-        """Places (T, 2, 2) in pixels and sureness (T, 2)."""
         small, scale, corner = _fitted(frames)
         around = references(small)
-        device, logits = next(self.network.parameters()).device, []
+        device, said = next(self.network.parameters()).device, []
         for i in range(0, len(small), 64):
             images = to_images(with_references(small[i : i + 64], around), device)
-            logits.append(both_ways(self.network, images).cpu())
-        place, sure = read(torch.cat(logits))
-        return (place.numpy() - corner) / scale, sure.numpy()
+            said.append([one.cpu() for one in both_ways(self.network, images)])
+        logits, shown = map(torch.cat, zip(*said, strict=True))
+        place, sure = read(logits)
+        ends = corner, corner + scale * frames.shape[2:0:-1]
+        columns, rows = (slice(round(a / 2), round(b / 2)) for a, b in zip(*ends, strict=True))
+        arms = shown[:, 0, rows, columns].sigmoid().numpy()
+        return Look((place.numpy() - corner) / scale, sure.numpy(), arms)
 
     def save(self, path: Path | str) -> None:
         """Write the weights as half-precision numbers, atomically."""

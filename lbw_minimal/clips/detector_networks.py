@@ -93,19 +93,13 @@ def loss(
     return where + MASK_WEIGHT * F.binary_cross_entropy_with_logits(mask_logits, masks)
 
 
-def both_ways(network: Network, images: torch.Tensor) -> torch.Tensor:
-    """Logits (B, 2, 42 * 42 + 1) of images (B, 12, 84, 84), averaged over them and their mirror
-    images: the errors of the two differ."""
-    logits, mirrored = network(images)[0], network(images.flip(3))[0]
+def both_ways(network: Network, images: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+    """What `Network` says of images (B, 12, 84, 84), averaged over them and their mirror images:
+    the errors of the two differ."""
+    (logits, shown), (mirrored, mirrored_shown) = network(images), network(images.flip(3))
     maps = mirrored[..., :-1].unflatten(2, (CELLS, CELLS)).flip(3).flatten(2)
-    return (logits + torch.cat([maps, mirrored[..., -1:]], 2)) / 2
-
-
-def masks_both_ways(network: Network, images: torch.Tensor) -> torch.Tensor:
-    """How sure each cell shows arm or object, (B, 2, 42, 42), of images (B, 12, 84, 84): the mean
-    over them and their mirror images."""
-    shown, mirrored = network(images)[1], network(images.flip(3))[1]
-    return ((shown + mirrored.flip(3)) / 2).sigmoid()
+    logits = (logits + torch.cat([maps, mirrored[..., -1:]], 2)) / 2
+    return logits, (shown + mirrored_shown.flip(3)) / 2
 
 
 def together(p: torch.Tensor) -> torch.Tensor:

@@ -127,14 +127,14 @@ def _among(changed, match, patch, other):
     return np.where(share >= MOVED, match, np.float32(other))
 
 
-def check_seen(frames: np.ndarray, tip: np.ndarray, sure: np.ndarray) -> None:
-    """Raise Unusable where the largest thing that has left its place in the frames (T, H, W, 3)
-    uint8 of one shot is seen nowhere from then on. It is not the hand as it was first, nor what an
-    arm covers in the end: an arm came to its place, and left the ground.
+def check_seen(thing: Vanished | None, tip: np.ndarray, sure: np.ndarray) -> None:
+    """Raise Unusable where the thing that has left its place in the T frames of one shot is seen
+    nowhere from then on. It is not the hand as it was first, nor what an arm covers in the end: an
+    arm came to its place, and left the ground.
 
     tip (T, 2) pixels, sure (T,): the hand; where it is never sure nothing is asked.
     """
-    thing, hand = vanished(frames), tip[sure >= SURE]
+    hand = tip[sure >= SURE]
     if thing is None or not len(hand):
         return
     apart = np.linalg.norm(hand[0] * thing.scale - thing.places[0])
@@ -147,10 +147,9 @@ def check_seen(frames: np.ndarray, tip: np.ndarray, sure: np.ndarray) -> None:
         )
 
 
-def followed(frames: np.ndarray, found: Found) -> Found:
+def followed(thing: Vanished | None, frames: np.ndarray, found: Found) -> Found:
     """Found in the frames (T, H, W, 3) uint8 of one shot, with the way of the thing that has left
     its place as the object's where that is another one, and that of a thing that is pushed."""
-    thing = vanished(frames)
     if thing is None or np.median(thing.alike[thing.left :]) < FOLLOWED:
         return found
     k, scale, n = thing.frames, thing.scale, len(frames)

@@ -14,7 +14,6 @@ import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +24,7 @@ from lbw_minimal.clips import arms, footage, light, screen, vanished
 from lbw_minimal.clips.behind import behind
 from lbw_minimal.clips.detector import Detector, Found, refine
 from lbw_minimal.clips.hiding import unlike
-from lbw_minimal.clips.motion import small, told
+from lbw_minimal.clips.motion import small, some
 from lbw_minimal.clips.outline import reaching
 from lbw_minimal.clips.page import clip_column, write_page
 from lbw_minimal.clips.patches import gone, mended
@@ -33,6 +32,7 @@ from lbw_minimal.clips.paths import Tracks, Unusable, jumps
 from lbw_minimal.clips.reader import Clip, read_clip
 from lbw_minimal.clips.retarget import FPS, Motion, Scene, lay
 from lbw_minimal.clips.shots import correctable
+from lbw_minimal.clips.sight import Sight, shots
 from lbw_minimal.clips.stills import write_stills
 from lbw_minimal.pictures import spread
 from lbw_minimal.report import COLUMNS
@@ -190,10 +190,12 @@ def follow(result: Prepared, choices: Choices) -> Motion:
     frames = seen.frames
     result.clip, result.warnings = replace(clip, frames=frames), result.warnings + seen.warnings
     result.light = partial(light.poor, frames[seen.shot])
-    arm = coming_in(frames[seen.shot], seen.off)
+    sights = shots(Detector.load(EYES), frames, clip.cuts)
+    longest = sights[[0, *clip.cuts].index(seen.shot.start)]
+    arm = coming_in(longest, seen.off)
     if seen.still and arm.seen < arms.SEEN:
         raise Unusable(*seen.still)
-    found = look(frames, clip.cuts, result.scene.contact is not None)
+    found = look(sights, frames, clip.cuts, result.scene.contact is not None)
     result.light = partial(light.poor, frames[seen.shot], found.tip_sure[seen.shot])
     tracks = Tracks(
         clip.times, found.tip, found.object, found.tip_sure, found.object_sure,
@@ -213,7 +215,8 @@ def follow(result: Prepared, choices: Choices) -> Motion:
     )
     unplaced = result.scene.contact is not None and not choices.object
     if unplaced:
-        vanished.check_seen(*(of[seen.shot] for of in (frames, tracks.tip, tracks.tip_sure)))
+        hand = tracks.tip[seen.shot], tracks.tip_sure[seen.shot]
+        vanished.check_seen(longest.vanished, *hand)
     motion = lay(tracks, result.scene, choices.mirror)
     if not choices.tip:
         result.tracks, motion = behind(tracks, motion, result.scene, choices.mirror)
@@ -223,26 +226,20 @@ def follow(result: Prepared, choices: Choices) -> Motion:
     return motion
 
 
-def coming_in(frames: np.ndarray, off: np.ndarray) -> arms.Arms:
-    """The arms that come into a shot's frames, as the shipped detector sees them and by what is
-    `off` the room, see `Footage`. One that rests for long is seen where something has moved."""
-    model = Detector.load(EYES)
-    arm = arms.count(model.arms(frames), off)
-    return arm if arm.seen >= arms.SEEN else arms.count(model.arms(frames[told(frames)]), off)
+def coming_in(sight: Sight, off: np.ndarray) -> arms.Arms:
+    """The arms that come into a shot, as the shipped detector sees them and by what is `off` the
+    room, see `Footage`. One that rests for long is seen where something has moved."""
+    arm = arms.count(some(sight.whole.arms), off)
+    return arm if arm.seen >= arms.SEEN else arms.count(some(sight.moving.arms), off)
 
 
-def look(frames: np.ndarray, cuts: Sequence[int], touched: bool) -> Found:
-    """Tip and object in a clip's frames, as the shipped detector sees them and patches agree.
-
-    The detector looks at each shot by itself: another shot is another camera's.
-    """
-    model = Detector.load(EYES)
-    shots = [looked(model, frames[a:b], touched) for a, b in pairwise([0, *cuts, len(frames)])]
-    joined = (np.concatenate([getattr(one, name) for one in shots]) for name in vars(shots[0]))
-    return refine(frames, Found(*joined), cuts)
+def look(sights: list[Sight], frames: np.ndarray, cuts: Sequence[int], touched: bool) -> Found:
+    """Tip and object in a clip's frames, as its shots are seen and patches and corners agree."""
+    each = [vars(looked(sight, touched)).values() for sight in sights]
+    return refine(frames, Found(*map(np.concatenate, zip(*each, strict=True))), cuts)
 
 
-def looked(model: Detector, frames: np.ndarray, touched: bool) -> Found:
+def looked(sight: Sight, touched: bool) -> Found:
     """Tip and object in one shot, at which the model looks twice: at all of it, and at the frames
     in which something has moved; what rests in between stays where it was.
 
@@ -252,9 +249,10 @@ def looked(model: Detector, frames: np.ndarray, touched: bool) -> Found:
     object from the tip's way: beside a wrong tip they find what rests. So they ask each look, and
     what moves as an object does, or else goes farthest, is the object.
     """
-    whole, kept = model.detect(frames), told(frames)
-    last = np.searchsorted(kept, np.arange(len(frames)), side="right") - 1
-    moving = Found(*(values[last] for values in vars(model.detect(frames[kept])).values()))
+    frames, model = sight.frames, sight.model
+    whole, moves = model.detect(frames, sight.whole), model.detect(frames[sight.told], sight.moving)
+    last = np.searchsorted(sight.told, np.arange(len(frames)), side="right") - 1
+    moving = Found(*(values[last] for values in vars(moves).values()))
     hand = max(whole, moving, key=lambda one: one.tip_sure.mean())
     if not touched:
         hand = reaching(frames, moving)
@@ -265,7 +263,7 @@ def looked(model: Detector, frames: np.ndarray, touched: bool) -> Found:
         looks += [one for one in (whole, moving) if not (one is hand and one is thing)]
     thing, _ = max((mended(frames, one) for one in looks), key=lambda m: (m[1], gone(m[0])))
     found = Found(hand.tip, thing.object, hand.tip_sure, thing.object_sure)
-    return vanished.followed(frames, found) if touched else found
+    return vanished.followed(sight.vanished, frames, found) if touched else found
 
 
 def stills(result: Prepared) -> np.ndarray:
