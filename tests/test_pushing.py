@@ -57,9 +57,28 @@ def test_what_goes_with_the_hand_from_the_start_and_comes_down_with_it_is_the_ha
     apart = (-0.1 - nearer / 100 * np.clip(1 - np.arange(N) / TOUCH, 0, 1))[:, None] * along
     if hand:
         with pytest.raises(Unusable, match="is the hand"):
-            check_apart(apart, along)
+            check_apart(apart, along, 100)
     else:
-        check_apart(apart, along)
+        check_apart(apart, along, 100)
+
+
+@pytest.mark.parametrize(
+    ("far", "along", "hand"),
+    [
+        (9.9, (10, 25), True),
+        (10.1, (10, 25), False),
+        (9.9, (25, 25), False),
+        (9.9, (10, -25), False),
+    ],
+)
+def test_what_goes_down_steeply_and_is_at_the_tip_all_along_is_the_hand(far, along, hand):
+    """However much the dots tremble: a hand comes to an object from a tenth of the picture away."""
+    apart = np.array([(far, 0.0), (-far, 0.0)] * 10)
+    if hand:
+        with pytest.raises(Unusable, match="is the hand"):
+            check_apart(apart, np.array(along, float), 100)
+    else:
+        check_apart(apart, np.array(along, float), 100)
 
 
 @pytest.mark.parametrize(

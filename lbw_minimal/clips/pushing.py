@@ -21,6 +21,9 @@ SIDEWAYS = 0.25  # of the width: an arm that comes in farther inside comes from 
 PULLS = 0.12
 GLUED = 0.25  # of its way: a hand that comes to an object comes nearer by more
 COMES_DOWN = 0.25  # of its way: a table and a camera are not so far out of level
+# Of the picture's shorter side: what goes down steeply and is never farther from the tip is the
+# hand. Of hands it was 0.06 at most, of things 0.17 or more.
+AT_HAND = 0.1
 # Of its way, between two frames in turn in which it is surely seen: a thing that is pushed goes by
 # at most 0.48, and a dot that jumps from one hand to the other by 0.7 to 1.
 LEAP = 0.6
@@ -68,13 +71,16 @@ def check_way(
         )
 
 
-def check_apart(apart: np.ndarray, along: np.ndarray) -> None:
+def check_apart(apart: np.ndarray, along: np.ndarray, side: int) -> None:
     """Raise Unusable where the object goes with the hand from the start, and comes down with it.
 
-    apart (n, 2) pixels: from the object to the tip, until the object is there; along (2,): its way.
+    apart (n, 2) pixels: from the object to the tip, until the object is there; along (2,): its way;
+    side: of the picture, the shorter one.
     """
     length = np.linalg.norm(along)
-    if np.linalg.norm(np.ptp(apart, axis=0)) < GLUED * length and along[1] > COMES_DOWN * length:
+    glued = np.linalg.norm(np.ptp(apart, axis=0)) < GLUED * length
+    at_hand = np.linalg.norm(apart, axis=1).max() < AT_HAND * side and along[1] > abs(along[0])
+    if (glued or at_hand) and along[1] > COMES_DOWN * length:
         raise Unusable(
             "the object never moves: what goes with the hand from the start, and comes down with "
             "it, is the hand",

@@ -125,7 +125,7 @@ def lay(tracks: Tracks, scene: Scene, mirror: bool | None = None) -> Motion:
     way = progress(thing, start, end)  # (N,) from 0 to 1
     i, j = (int(np.argmax(way >= share)) for share in (CONTACT if touched else ARRIVED, ARRIVED))
     if touched:
-        check_apart((tip - thing)[: j + 1], end - start)
+        check_apart((tip - thing)[: j + 1], end - start, tracks.side)
     A = fit(start, end, scene, mirror)
     x = apply(A, tip)  # (N, 2) m
     if touched:
