@@ -402,6 +402,27 @@ def test_a_thing_that_is_touched_should_be_in_sight_unless_the_user_placed_it(
     assert (result.tracks == "put behind") == (name != "tip")
 
 
+@pytest.mark.parametrize(("hidden", "told"), [(True, "the arm hides"), (False, "no arm is seen")])
+def test_that_an_arm_hides_the_object_is_told_before_how_many_arms_are_seen(
+    hidden, told, monkeypatch
+):
+    """One that is before a thing may reach from edge to edge of the picture, as two people do."""
+
+    def seen(*what):
+        if hidden:
+            raise Unusable("the arm hides the object", "push it from behind")
+
+    nothing = Found(np.zeros((6, 2)), np.zeros((6, 2)), np.zeros(6), np.zeros(6))
+    monkeypatch.setattr(prepare, "look", lambda sights, frames, cuts, touched: nothing)
+    monkeypatch.setattr(prepare, "coming_in", lambda sight, off: NONE)
+    monkeypatch.setattr(
+        prepare.footage, "check", lambda frames, cuts: Footage(frames, [], slice(0, 6), None, False)
+    )
+    monkeypatch.setattr(prepare.vanished, "check_seen", seen)
+    with pytest.raises(Unusable, match=told):
+        follow(prepared(scene=SimpleNamespace(contact=0.04)), Choices())
+
+
 @pytest.mark.parametrize("name", ["", "tip", "object"])
 def test_a_user_who_places_the_tip_overrules_that_there_is_no_arm(name, monkeypatch):
     """It is searched all the same, so that the page shows what was found and can be corrected."""

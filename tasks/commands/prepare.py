@@ -203,6 +203,10 @@ def follow(result: Prepared, choices: Choices) -> Motion:
     )  # fmt: skip
     tracks = tracks.marked("tip", list(choices.tip)).marked("object", list(choices.object))
     result.tracks, result.notes = tracks, result.notes + [choices.placed] * bool(choices.placed)
+    unplaced = result.scene.contact is not None and not choices.object
+    if unplaced:  # before arms are counted: one that is before a thing reaches far into the picture
+        hand = tracks.tip[seen.shot], tracks.tip_sure[seen.shot]
+        vanished.check_seen(longest.vanished, *hand)
     if arm.doubt:
         if not choices.tip:
             raise Unusable(*arm.doubt)
@@ -213,10 +217,6 @@ def follow(result: Prepared, choices: Choices) -> Motion:
         f"{len(frames)} frames at {rate:.3g} a second; their motion was smoothed and taken at "
         f"{FPS} a second, by the time stamps."
     )
-    unplaced = result.scene.contact is not None and not choices.object
-    if unplaced:
-        hand = tracks.tip[seen.shot], tracks.tip_sure[seen.shot]
-        vanished.check_seen(longest.vanished, *hand)
     motion = lay(tracks, result.scene, choices.mirror)
     if not choices.tip:
         result.tracks, motion = behind(tracks, motion, result.scene, choices.mirror)
