@@ -167,3 +167,18 @@ def test_the_detector_is_believed_where_it_agrees_and_where_the_thing_is_not_pus
     swings = film((WAY + 20 * np.sin(np.arange(N))).astype(int))
     assert followed(swings, off) is off
     assert followed(film(np.full(N, 60)), off) is off
+
+
+def test_an_object_that_stays_where_a_thing_has_left_is_that_thing_however_it_went():
+    """A lifted one: it does not go as a pushed one does, and is less like itself in the air."""
+    swings = 20 * np.sin(np.maximum(0, np.arange(N) - LEAVES))
+    lifted = film((WAY + swings).astype(int))
+    stays = found(np.full(N, 67.0))
+    told = followed(lifted, stays)
+    assert np.ptp(told.object, axis=0).max() > 40 and told.tip is stays.tip
+    beside = found(np.full(N, 72.0))  # five pixels beside it
+    assert followed(lifted, beside) is beside
+    leaves = found(67.0 + np.linspace(0, 8, N))  # by more than 0.06 of 120 pixels
+    assert followed(lifted, leaves) is leaves
+    hidden = film(hides=lambda t: t >= COMES)
+    assert followed(hidden, stays) is stays

@@ -16,8 +16,8 @@ import cv2
 import numpy as np
 
 from lbw_minimal.clips.detector import Found
-from lbw_minimal.clips.patches import CHANGED, Path, looked_at, shrunk, tip_at
-from lbw_minimal.clips.paths import SURE, Unusable
+from lbw_minimal.clips.patches import ALIKE, CHANGED, Path, looked_at, shrunk, tip_at
+from lbw_minimal.clips.paths import LEAST_WAY, SURE, Unusable, extent
 
 ENDS = 16  # a shot's first and last frames are so many of it
 THING = 25, 40  # pixels of the small frames: least area, and most width or height
@@ -149,15 +149,19 @@ def check_seen(thing: Vanished | None, tip: np.ndarray, sure: np.ndarray) -> Non
 
 def followed(thing: Vanished | None, frames: np.ndarray, found: Found) -> Found:
     """Found in the frames (T, H, W, 3) uint8 of one shot, with the way of the thing that has left
-    its place as the object's where that is another one, and that of a thing that is pushed."""
-    if thing is None or np.median(thing.alike[thing.left :]) < FOLLOWED:
+    its place as the object's where that is another one, and that of a thing that is pushed; or
+    where the object stays there: then it was seen as it stood, and not as it left."""
+    alike = np.median(thing.alike[thing.left :]) if thing else 0
+    if thing is None or alike < ALIKE:
         return found
     k, scale, n = thing.frames, thing.scale, len(frames)
     side = round(min(frames.shape[1:3]) * scale)
     path = Path(thing.places, thing.alike, tip_at(found, k, scale), side)
     sure = found.object_sure[k] >= SURE
     near = np.linalg.norm(found.object[k] * scale - thing.places, axis=1) < AGREES[0]
-    if not path.pushed or (near & sure).mean() >= AGREES[1]:
+    goes = alike >= FOLLOWED and path.pushed and (near & sure).mean() < AGREES[1]
+    stays = near[0] and extent(found.object[k][sure]) < LEAST_WAY * min(frames.shape[1:3])
+    if not goes and not stays:
         return found
     along = np.arange(n)
     places = [np.interp(along, k, thing.places[:, axis] / scale) for axis in (0, 1)]
