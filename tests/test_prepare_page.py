@@ -1,12 +1,13 @@
 """The page of `prepare` in a browser: what a click into a frame of the clip does."""
 
 import re
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from lbw_minimal.clips.page import write_page
+from lbw_minimal.clips.page import confidence, courses, write_page
 from lbw_minimal.clips.paths import Tracks
 from lbw_minimal.clips.shots import clip_frames
 from tests import browser
@@ -70,6 +71,15 @@ PAPER = """
  (tops => tops.filter(top => top === tops[0]).length)(
    [...document.querySelectorAll(".clip img")].map(e => e.getBoundingClientRect().top))]
 """
+# How far below the window's upper edge the choice of a dot is, while the last picture is looked at.
+CHOICE = """
+(() => {
+  document.querySelector(".clip figure:last-child").scrollIntoView({block: "end"});
+  const top = document.querySelector("[name=what]").closest("p").getBoundingClientRect().top;
+  scrollTo(0, 0);
+  return top;
+})()
+"""
 
 
 async def look(folder):
@@ -99,6 +109,7 @@ async def look(folder):
             night = [{"name": "prefers-color-scheme", "value": theme}]
             await page.call("Emulation.setEmulatedMedia", features=night)
             states[width, theme] = await page.js(AUDIT)
+            states[width, "choice"] = await page.js(CHOICE)
         await page.call("Emulation.setEmulatedMedia", media="print")
         states["paper"] = await page.js(PAPER)
         await page.call("Emulation.setEmulatedMedia", media="screen")
@@ -189,6 +200,36 @@ def test_after_a_click_the_corrected_command_comes_first(seen):
 @pytest.mark.parametrize("how", [(WIDE, "light"), (PHONE, "light"), (WIDE, "dark")])
 def test_the_page_can_be_read(seen, how):
     assert seen[how] == FINE
+
+
+def test_on_a_phone_the_choice_of_a_dot_stays_in_sight_at_the_last_picture(seen):
+    assert 0 <= seen[PHONE, "choice"] < 10
+
+
+def test_of_black_lines_a_page_speaks_only_where_the_picture_changes(tmp_path):
+    frames, times, tracks = clip()
+    for cuts in ((), (6,)):
+        write_page(
+            tmp_path / "page.html", task="push", command="", verdict="usable", frames=frames,
+            times=times, scene=SimpleNamespace(), notes=[], warnings=[],
+            tracks=replace(tracks, cuts=cuts),
+        )  # fmt: skip
+        assert ("black line" in (tmp_path / "page.html").read_text()) == bool(cuts)
+
+
+@pytest.mark.parametrize("done", [True, False])
+def test_the_legends_name_every_path_and_cover_none(done):
+    _, _, tracks = clip()
+    path = np.zeros((N, 2))
+    motion = SimpleNamespace(tip=path, object=path, contact=2, arrival=9)
+    states = np.zeros((N, 9)) if done else None
+    figures = confidence(tracks), courses(motion, SimpleNamespace(goal=(0.5, 0.0)), states)
+    for figure, names in zip(figures, (["tip", "object"], ["tip", "object", "goal"]), strict=True):
+        figure.canvas.draw()
+        (legend,) = figure.legends
+        assert [text.get_text() for text in legend.get_texts()] == names
+        over = legend.get_window_extent().padded(-5)  # without its empty border, pixels
+        assert not any(over.overlaps(axis.get_window_extent()) for axis in figure.axes)
 
 
 def test_on_paper_nothing_asks_for_a_click(seen):

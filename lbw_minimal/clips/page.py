@@ -51,8 +51,9 @@ as it is now.</p>
 """
 SURENESS = """
 <p>How sure the network is of tip and object, over the clip. Below the dashed line a dot is hollow.
-At a black line the whole picture changes.</p>
+{}</p>
 """
+CUTS = "At a black line the whole picture changes."
 SCENE = """
 <p>The clip's motion in the task's scene, in centimetres, as the simulated human was asked to do it
 (dashed) and did it (solid). Contact and arrival are the two grey lines. Before the clip's hand
@@ -106,7 +107,8 @@ def write_page(
         title = "What was found in the clip" if tracks else "The clip"
         page += section(title, *to_correct(frames, times, tracks, used, command))
     if tracks is not None:
-        page += [SURENESS, picture(svg(confidence(tracks)), "How sure tip and object were found")]
+        words = SURENESS.format(CUTS if tracks.cuts else "")
+        page += [words, picture(svg(confidence(tracks)), "How sure tip and object were found")]
     if notes:
         page += section(
             "What was done", f"<ul>{''.join(f'<li>{escape(n)}</li>' for n in notes)}</ul>"
@@ -185,7 +187,7 @@ def confidence(tracks: Tracks) -> Figure:
         for cut in tracks.cuts:
             axis.axvline(tracks.times[cut], color="black", lw=1)
         axis.set(xlabel="time in the clip (s)", ylabel="sureness", ylim=(0, 1.05))
-        axis.legend(loc="lower right", ncols=2)
+        figure.legend(loc="outside upper center", ncols=2)
     return figure
 
 
@@ -196,9 +198,11 @@ def courses(motion: Motion, scene: Scene, states: np.ndarray | None) -> Figure:
         above, below = figure.subplots(2, sharex=True)
         for axis, k, name in ((above, 0, "along the table"), (below, 1, "above the table")):
             t = np.arange(len(motion.tip)) / FPS
-            axis.plot(t, 100 * motion.tip[:, k], "--", color=COLOURS[4], lw=1.5)
+            names = ("tip", "object") if states is None else (None, None)  # the solid one has it
+            dashed = {"ls": "--", "lw": 1.5}
+            axis.plot(t, 100 * motion.tip[:, k], color=COLOURS[4], label=names[0], **dashed)
             if motion.object is not None:
-                axis.plot(t, 100 * motion.object[:, k], "--", color=COLOURS[5], lw=1.5)
+                axis.plot(t, 100 * motion.object[:, k], color=COLOURS[5], label=names[1], **dashed)
             if states is not None:
                 t = np.arange(len(states)) / FPS
                 axis.plot(t, 100 * states[:, 2 * k], color=COLOURS[4], lw=2, label="tip")
@@ -209,5 +213,5 @@ def courses(motion: Motion, scene: Scene, states: np.ndarray | None) -> Figure:
                 axis.axvline(step / FPS, color="grey", lw=1)
             axis.set(ylabel=f"{name} (cm)")
         below.set_xlabel("time in the re-enactment (s)")
-        above.legend(loc="upper left", ncols=3)
+        figure.legend(*above.get_legend_handles_labels(), loc="outside upper center", ncols=3)
     return figure

@@ -58,7 +58,7 @@ def check_way(
     if np.abs(aside).max() > LIFTED:
         raise Unusable(
             f"the object leaves its straight way by {np.abs(aside).max():.0%} of its length",
-            "push it straight along the table, without lifting it",
+            "push it in a straight line, without lifting it",
         )
     if tracks.enters < SIDEWAYS or tracks.enters > 1 - SIDEWAYS:
         return

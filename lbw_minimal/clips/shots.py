@@ -27,6 +27,8 @@ STRIP = """
 label { display: inline-block; margin-right: .8rem }
 td:first-child { white-space: nowrap }
 .shot { display: block; position: relative }
+.choice { position: sticky; top: 0; z-index: 1; max-width: none; padding: .3rem 0;
+          background: var(--page) }  /* in sight at each picture */
 .click { position: absolute; width: 12px; height: 12px; margin: -6px; border: 2px solid #000;
          border-radius: 50%; pointer-events: none; outline: 1px solid #fff }
 @media print { .clicks { display: none } .clip { grid-template-columns: repeat(4, 1fr) }
@@ -147,8 +149,9 @@ def to_correct(
     colours = json.dumps({name: f"rgb{ink}" for name, ink in inks})
     script = SCRIPT % (json.dumps(command).replace("<", "\\u003c"), colours)
     said = CLICK + CUT if tracks else ONLY_CUT
-    clicks = f'<div class="clicks">{said}<p>{radios}</p></div>'
-    return [LEGEND if tracks else "", clicks, clip_frames(frames, times, tracks, used), script]
+    choice = f'<p class="clicks choice">{radios}</p>'
+    shots = f"<div>{choice}{clip_frames(frames, times, tracks, used)}</div>"
+    return [LEGEND if tracks else "", f'<div class="clicks">{said}</div>', shots, script]
 
 
 def clip_frames(
