@@ -168,7 +168,8 @@ def parts(rows: list[dict], fps: float = 25, success: int | None = None) -> Figu
         if success:
             axis.axvline(success / fps, color="black", lw=1)
             where = ("data", "axes fraction")
-            axis.annotate(" task done", (success / fps, 0.03), xycoords=where, fontsize=9)
+            said = axis.annotate("task done", (success / fps, 1.01), xycoords=where, fontsize=9)
+            said.set(ha="center", va="bottom")  # off the curves
         axis.set(xlabel="time in the episode (s)", ylabel="part of the reward a step")
         axis.set_ylim(top=max(0, axis.get_ylim()[1]))  # 0 is the best there is
         figure.legend(loc="outside upper center", ncols=4)

@@ -176,6 +176,10 @@ def test_parts_of_the_reward_come_after_their_steps_and_0_is_at_the_top():
     np.testing.assert_allclose(axis.lines[1].get_ydata(), [-2, -0.5])
     np.testing.assert_allclose(axis.lines[2].get_xdata(), 0.08)  # where the task was done
     assert axis.get_ylim()[1] >= 0
+    axis.figure.canvas.draw()
+    (said,) = axis.texts
+    assert said.get_text() == "task done"
+    assert not said.get_window_extent().overlaps(axis.get_window_extent())  # nor covers a curve
 
 
 def test_columns_say_at_which_second_they_are_and_what_the_classifier_said():
