@@ -146,6 +146,14 @@ def test_a_mark_or_a_time_that_is_none_is_named(wrong, tmp_path, capfd):
     assert repr(wrong[1]) in capfd.readouterr().err
 
 
+@pytest.mark.parametrize("last", ["1.5", "2"])
+def test_an_end_before_the_start_is_a_mistake_and_not_the_clips_fault(last, tmp_path, capfd):
+    (tmp_path / "a.mp4").touch()
+    assert main(["prepare", "push", str(tmp_path / "a.mp4"), "--from", "2", "--to", last]) == 2
+    said = capfd.readouterr()
+    assert f"--to {last} is not after --from 2" in said.err and "not usable" not in said.out
+
+
 @pytest.fixture(scope="module")
 def scene():
     env = bare("push", observation="state")

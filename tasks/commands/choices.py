@@ -24,18 +24,25 @@ Mark = tuple[float, float, float]  # x, y in pixels of the clip as it was read, 
 
 
 class Misplaced(InputError):
-    """A correction names a place or a second that the clip has not."""
+    """A correction names a place or a second that the clip has not, or an end before its start."""
 
 
 @dataclass(frozen=True)
 class Choices:
-    """What the user decides instead of the clip."""
+    """What the user decides instead of the clip. Raises Misplaced if it ends before it starts."""
 
     first: float = 0.0  # s
     last: float | None = None  # s
     mirror: bool | None = None
     tip: tuple[Mark, ...] = ()
     object: tuple[Mark, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.last is not None and self.last <= self.first:
+            raise Misplaced(
+                f"--to {self.last:g} is not after --from {self.first:g}; give the first and the "
+                "last second to use, in this order."
+            )
 
     def __str__(self) -> str:
         """The options that say so, as on a command line; "" if all is left to the clip."""
