@@ -124,6 +124,22 @@ def test_a_hand_has_come_to_the_place_and_left_the_ground(frames, hidden):
     seen(covered)
 
 
+@pytest.mark.parametrize(("frames", "hidden"), [(3, False), (4, True)])
+def test_a_hand_that_covers_most_of_a_thing_before_that_goes_hides_it(frames, hidden):
+    """Its left edge stays in sight all along, and so is found; it is near its place for two frames
+    more."""
+    clip = film()
+    for t in range(LEAVES - frames, N):
+        put(clip[t], HAND, WAY[t] + 6, 62)
+    thing = vanished.vanished(clip)
+    assert (thing.unlike() <= vanished.UNLIKE).mean() >= vanished.OFTEN
+    if hidden:
+        with pytest.raises(Unusable, match="hides most of the object before that goes"):
+            seen(clip)
+    else:
+        seen(clip)
+
+
 def test_what_stood_where_the_hand_was_first_is_the_hand():
     gone = film(hides=lambda t: t >= COMES)
     place = vanished.vanished(gone).places[0]

@@ -42,6 +42,7 @@ class Vanished(NamedTuple):
     alike: np.ndarray  # (n,) correlation with the thing as it stood; 1 while it stands
     left: int  # the first of the n in which it has left
     covered: int  # in how many of the n something else is at its place: an arm that comes and goes
+    before: int  # in how many of these it is what still stands there, and looks most like it
     scale: float  # pixels of the small frames in a pixel
     unlike: Callable[[], np.ndarray]  # how unlike it its most alike half is after that, (n - left,)
 
@@ -71,12 +72,14 @@ def vanished(frames: np.ndarray) -> Vanished | None:
         _, alike[t], _, at = cv2.minMaxLoc(_among(changed[t], match, patch, -1))
         places[t] = half + at
     ground = np.sqrt(((first - last)[thing] ** 2).mean())
+    stays = np.linalg.norm(places - places[0], axis=1) < AGREES[0]
 
     def unlike():
         halves = [_unlike(small[left:], changed[left:], *half) for half in _halves(patch, mask)]
         return np.min(halves, axis=0) / ground
 
-    return Vanished(k, places, alike, left, int(covered.sum()), scale, unlike)
+    hides = int(covered.sum()), int((covered & stays)[left:].sum())
+    return Vanished(k, places, alike, left, *hides, scale, unlike)
 
 
 def _largest(first, last):
@@ -129,8 +132,8 @@ def _among(changed, match, patch, other):
 
 def check_seen(thing: Vanished | None, tip: np.ndarray, sure: np.ndarray) -> None:
     """Raise Unusable where the thing that has left its place in the T frames of one shot is seen
-    nowhere from then on. It is not the hand as it was first, nor what an arm covers in the end: an
-    arm came to its place, and left the ground.
+    nowhere from then on, or is covered for a while before it goes. It is not the hand as it was
+    first, nor what an arm covers in the end: an arm came to its place, and left the ground.
 
     tip (T, 2) pixels, sure (T,): the hand; where it is never sure nothing is asked.
     """
@@ -140,11 +143,13 @@ def check_seen(thing: Vanished | None, tip: np.ndarray, sure: np.ndarray) -> Non
     apart = np.linalg.norm(hand[0] * thing.scale - thing.places[0])
     if apart < BESIDE or thing.covered < PASSES:
         return
+    remedy = "push it from behind, with the hand between it and the edge of the picture"
     if (thing.unlike() <= UNLIKE).mean() < OFTEN:
         raise Unusable(
-            "the arm hides the object, which is gone from its place and seen nowhere else",
-            "push it from behind, with the hand between it and the edge of the picture",
+            "the arm hides the object, which is gone from its place and seen nowhere else", remedy
         )
+    if thing.before >= PASSES:
+        raise Unusable("the arm hides most of the object before that goes", remedy)
 
 
 def followed(thing: Vanished | None, frames: np.ndarray, found: Found) -> Found:
