@@ -140,6 +140,19 @@ def test_a_hand_that_covers_most_of_a_thing_before_that_goes_hides_it(frames, hi
         seen(clip)
 
 
+def test_an_arm_that_stays_where_a_thing_was_does_not_hide_it():
+    """Though that place then looks most like it: it has gone before, out of the picture."""
+    x = np.interp(np.arange(N), [LEAVES, THERE], [60, 160]).round().astype(int)
+    clip = np.stack([np.pad(WALL, ((0, 0), (0, 20), (0, 0)))] * N)
+    for t, frame in enumerate(clip):
+        put(frame, THING, min(x[t], 150), 70)
+    clip = np.ascontiguousarray(clip[:, :, :160])
+    for t in range(LEAVES + 5, N - 4):
+        put(clip[t], HAND, 50, 62)
+        put(clip[t], THING[:, :5], 60, 70)
+    seen(clip)
+
+
 def test_what_stood_where_the_hand_was_first_is_the_hand():
     gone = film(hides=lambda t: t >= COMES)
     place = vanished.vanished(gone).places[0]

@@ -42,7 +42,7 @@ class Vanished(NamedTuple):
     alike: np.ndarray  # (n,) correlation with the thing as it stood; 1 while it stands
     left: int  # the first of the n in which it has left
     covered: int  # in how many of the n something else is at its place: an arm that comes and goes
-    before: int  # in how many of these it is what still stands there, and looks most like it
+    before: int  # in how many of these before what looks most like the thing goes from there
     scale: float  # pixels of the small frames in a pixel
     unlike: Callable[[], np.ndarray]  # how unlike it its most alike half is after that, (n - left,)
 
@@ -72,13 +72,13 @@ def vanished(frames: np.ndarray) -> Vanished | None:
         _, alike[t], _, at = cv2.minMaxLoc(_among(changed[t], match, patch, -1))
         places[t] = half + at
     ground = np.sqrt(((first - last)[thing] ** 2).mean())
-    stays = np.linalg.norm(places - places[0], axis=1) < AGREES[0]
+    goes = left + int(np.argmax(np.linalg.norm((places - places[0])[left:], axis=1) >= AGREES[0]))
 
     def unlike():
         halves = [_unlike(small[left:], changed[left:], *half) for half in _halves(patch, mask)]
         return np.min(halves, axis=0) / ground
 
-    hides = int(covered.sum()), int((covered & stays)[left:].sum())
+    hides = int(covered.sum()), int(covered[left:goes].sum())
     return Vanished(k, places, alike, left, *hides, scale, unlike)
 
 
