@@ -517,6 +517,17 @@ def test_a_hand_may_come_down_more_steeply_than_a_thing_may_go():
         fit(start, start + (100, 160), scene, False)
 
 
+@pytest.mark.parametrize(
+    ("contact", "down", "said"), [(0.05, -300, True), (0.05, 300, False), (None, -300, False)]
+)
+def test_what_goes_up_steeply_may_have_been_lifted(contact, down, said):
+    """A thing that goes down the picture comes nearer, and a hand may be anywhere."""
+    start = np.array([100.0, 400])
+    with pytest.raises(Unusable, match="film from the side") as error:
+        fit(start, start + (100, down), replace(SCENE, contact=contact), False)
+    assert ("lift nothing" in str(error.value)) == said
+
+
 def test_a_goal_that_is_higher_is_got_to_without_leaning():
     scene = replace(SCENE, start=(0.46, 0.12), goal=(0.68, 0.06))
     A = fit(np.array([10.0, 50]), np.array([120.0, 90]), scene, False)

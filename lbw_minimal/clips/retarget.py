@@ -157,12 +157,12 @@ def fit(start: np.ndarray, end: np.ndarray, scene: Scene, mirror: bool) -> np.nd
     way of a hand that touches nothing is turned: nothing in it has to stay upright.
     Raises Unusable where the way is not one across the picture, or goes backwards.
     """
-    (dx, dy), sign = end - start, -1 if mirror else 1
-    touched = scene.contact is not None
+    (dx, dy), sign, touched = end - start, -1 if mirror else 1, scene.contact is not None
     if abs(dy) > (STEEP if touched else STEEP_HAND) * abs(dx):
         raise Unusable(
             f"it goes {abs(dy):.0f} pixels up or down and {abs(dx):.0f} across",
-            "film from the side, at the height of the table, so that it goes across the picture",
+            "lift nothing, and " * bool(touched and dy < 0)
+            + "film from the side, at the height of the table, so that it goes across the picture",
         )
     if sign * dx < 0:
         raise Unusable(
