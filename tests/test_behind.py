@@ -84,6 +84,17 @@ def test_another_shot_stays_as_it_is():
     np.testing.assert_allclose(tracks.tip[6:30], np.tile(first, (24, 1)))
 
 
+def test_where_the_picture_changes_on_the_objects_way_it_is_one_shot_all_the_same():
+    """As where a lamp goes on: neither tip nor object jumps, so the piece that is used goes on."""
+    wrong = on_the_object(RIGHT.times > 0.9)
+    whole, share = put_behind(wrong, TOUCH, THERE)
+    for later in (TOUCH + 0.02, THERE - 0.3, THERE):
+        cut = int(np.searchsorted(RIGHT.times, later))
+        tracks, again = put_behind(replace(wrong, cuts=(cut,)), TOUCH, THERE)
+        np.testing.assert_array_equal(tracks.tip, whole.tip)
+        assert again == share
+
+
 def test_a_hit_and_a_hand_that_touches_nothing_are_let_alone():
     t = np.arange(0, 2.6, 1 / 30)
     tracks = replace(seen(hit(t), t), width=SIDE)

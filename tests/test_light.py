@@ -84,6 +84,15 @@ def test_light_that_changes_and_what_is_smaller_than_an_arm_are_no_arm():
         assert np.isnan(light.measured(frames)[1]) and light.poor(frames) == ""
 
 
+def test_an_arm_differs_by_as_much_while_the_light_changes():
+    """As by a window in front of which a cloud moves away: 32 levels in all."""
+    wall = np.full((96, 160, 3), 120, np.uint8)
+    frames = np.concatenate([film(0, room=wall), film((10, 25, -5), room=wall)])
+    day = np.linspace(-16, 16, len(frames)).round()[:, None, None, None]
+    bright, differs = light.measured(np.uint8(frames + day))
+    assert bright == pytest.approx(120, abs=1) and differs == pytest.approx(25, abs=3)
+
+
 @pytest.mark.parametrize("name", TASKS)
 def test_nothing_is_said_of_the_kits_own_films(name):
     frames, _ = video.read(VIDEOS / name / "expert_01.mp4")

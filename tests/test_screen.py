@@ -71,6 +71,16 @@ def test_a_dark_room_is_no_screen(level, screen):
     assert (recorded(page(0.6, level)) is not None) == screen
 
 
+@pytest.mark.parametrize(
+    ("colour", "screen"),
+    [((200, 0, 0), True), ((0, 0, 255), True), ((16, 2, 1), True), ((15, 15, 15), False)],
+)
+def test_a_screen_of_a_full_colour_is_no_dark_room(colour, screen):
+    """Two of its three levels are as low as those of a shadow."""
+    assert (recorded(page(0.6, colour)) is not None) == screen
+    assert (recorded(desktop(white=colour)) is not None) == screen
+
+
 def unusable(result, choices):
     result.warnings.append("The camera trembles.")
     raise Unusable("the camera moves", "put it on a stand")
