@@ -391,3 +391,28 @@ def test_a_run_beside_is_known_by_its_settings(tmp_path):
         (tmp_path / "settings.json").write_text(json.dumps({"method": method, "seed": 2}))
         assert controls.method_of(tmp_path) == name
     assert controls.settings(tmp_path) == {"method": "tracks", "seed": 2}
+
+
+def test_of_each_method_one_run_of_the_task_itself_is_tested_beside_it(tmp_path, monkeypatch):
+    asked = []
+    monkeypatch.setattr(controls, "measure", lambda *a: asked.append(a[4]) or {"success": {}})
+    monkeypatch.setattr(controls, "table", lambda note: "")
+    a, b, c = (tmp_path / name for name in "abc")
+    for run, method, task in ((a, "tracks", "push"), (b, "avid", "push"), (c, "tracks", "slide")):
+        run.mkdir()
+        (run / "settings.json").write_text(json.dumps({"method": method, "task": task}))
+
+    def test(task, *runs):
+        beside = [word for run in runs for word in ("--beside", str(run))]
+        controls.main([task, *beside, "--out", str(tmp_path)])
+
+    test("push", a, b)
+    assert asked == [{"Object tracks": a, "AVID-m": b}]
+    for runs, why in (
+        ((a, c), f"{c}: a run of the task slide, not of push; give one of push."),
+        ((a, b, a), f"--beside {a}: {a} is of Object tracks, too; give one of each."),
+    ):
+        with pytest.raises(InputError) as told:
+            test("push", *runs)
+        assert str(told.value) == why
+    assert len(asked) == 1

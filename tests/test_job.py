@@ -10,6 +10,7 @@ import pytest
 from digests import options
 
 import tasks
+from lbw_minimal import sac
 from lbw_minimal.imitate import Recipe
 from lbw_minimal.training import InputError
 from tasks.commands import job
@@ -158,6 +159,20 @@ def test_a_replay_has_to_have_all_networks_of_its_method(method, wanted, tmp_pat
         monkeypatch.setattr(job, name, SimpleNamespace(load=load))
     job.check_weights(tmp_path, "push", method)
     assert loaded == wanted
+
+
+@pytest.mark.parametrize("method", ["lbw", "tracks"])
+def test_a_policy_of_another_task_is_not_replayed(method, tmp_path):
+    """By object tracks each task's policy sees fifteen numbers, so its file would fit."""
+    sac.save(tmp_path / "policy.safetensors", sac.SAC(15, 3))
+    job.check_weights(tmp_path, "push", method)  # nothing is noted there
+    (tmp_path / "settings.json").write_text('{"task": "slide", "method": "tracks"}')
+    job.check_weights(tmp_path, "slide", method)
+    with pytest.raises(InputError) as told:
+        job.check_weights(tmp_path, "push", method)
+    assert str(told.value) == (
+        f"{tmp_path}: a run of the task slide, not of push; give one of push."
+    )
 
 
 def test_a_job_notes_what_makes_the_run_again(tmp_path, monkeypatch):

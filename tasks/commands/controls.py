@@ -24,6 +24,7 @@ from lbw_minimal.imitate import watched
 from lbw_minimal.report import wilson
 from lbw_minimal.training import InputError, counted, write_atomic
 from tasks.commands import JITTER, Parser, at_least, make_folder, metres
+from tasks.commands.job import check_task
 from tasks.commands.run import TEST_SEED
 from tasks.commands.table import METHODS, markdown
 from tasks.world import SIZE, TaskEnv
@@ -235,7 +236,12 @@ def main(argv: list[str]) -> None:
     args = parser().read(argv)
     weights = args.weights or tasks.WEIGHTS / args.task
     make_folder(args.out)
-    beside = {method_of(run): run for run in args.beside}
+    beside: dict[str, Path] = {}
+    for run in args.beside:
+        check_task(run, args.task)
+        if (name := method_of(run)) in beside:
+            raise InputError(f"--beside {run}: {beside[name]} is of {name}, too; give one of each.")
+        beside[name] = run
     jitters = JITTERS if args.jitter is None else (args.jitter,)
     note = measure(args.task, weights, args.episodes, args.seed, beside, jitters)
     write_atomic(args.out / f"{args.task}.json", json.dumps(note, indent=1) + "\n")

@@ -181,12 +181,24 @@ def read_video(path: Path, whole: bool = False) -> np.ndarray:
 def check_weights(weights: Path, name: str, method: str) -> None:
     """Raise InputError unless the folder `weights` holds what a replay of the method takes."""
     if method not in PIXELS:
+        check_task(weights, name)
         sac.load(weights / "policy.safetensors")
         return
     sac_ae.load(weights / "policy.safetensors")
     classifier.load(weights / "classifier.safetensors", name)
     if method == "avid":
         cyclegan.load(weights / "translation.safetensors", name)
+
+
+def check_task(run: Path, name: str) -> None:
+    """Raise InputError if the folder `run` holds a run of another task than `name`.
+
+    A policy by object tracks does not tell by itself: what it sees is as long in every task.
+    """
+    note = run / "settings.json"
+    there = json.loads(note.read_text(encoding="utf-8")) if note.exists() else {}
+    if (task := there.get("task", name)) != name:
+        raise InputError(f"{run}: a run of the task {task}, not of {name}; give one of {name}.")
 
 
 def refuse_idle_options(args: argparse.Namespace, from_scratch: bool) -> None:
