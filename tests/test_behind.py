@@ -56,6 +56,18 @@ def test_it_is_behind_as_the_way_goes():
     assert share == 1
 
 
+@pytest.mark.parametrize("mirror", [True, None])
+def test_a_clip_is_mirrored_as_it_was_laid_first(mirror):
+    """Who asks for it is not told of it, neither by the first laying nor by the second."""
+    wrong = on_the_object(RIGHT.times > 0.9)
+    tip, thing = (np.array([SIDE, 0]) + path * (-1, 1) for path in (wrong.tip, wrong.object))
+    wrong = replace(wrong, tip=tip, object=thing)
+    motion = lay(wrong, SCENE, mirror)
+    tracks, again = behind(wrong, motion, SCENE, mirror)
+    assert tracks is not wrong and again.mirrored
+    assert ["mirrored" in note for note in again.notes].count(True) == (mirror is None)
+
+
 def test_in_a_few_frames_it_is_put_behind_the_object_and_nothing_is_said():
     few = MOVES & (RIGHT.times < 1.5)
     wrong = on_the_object(few)

@@ -91,6 +91,11 @@ def test_the_gap_counts_only_while_the_object_moves():
     assert gap(px[5:]) == 5.0
 
 
+def test_an_object_that_never_moves_has_no_gap():
+    """No NaN, which is no JSON: a smoke run's keypoints may show nothing that moves."""
+    assert gap(np.tile([8.0, 8, 12, 8], (9, 1))) is None
+
+
 def test_frames_that_tip_or_object_have_left_do_not_count():
     inside, outside = [10.0, 10, 20, 20], [[10.0, 10, 90, 20], [-1, 10, 20, 20], [10, 84, 20, 20]]
     truth = np.array([inside, *outside])

@@ -97,9 +97,12 @@ def in_picture(film: np.ndarray, truth: np.ndarray) -> tuple[np.ndarray, np.ndar
     return film[seen], truth[seen]
 
 
-def gap(px: np.ndarray) -> float:
-    """Mean x in pixels from tip to object, of the frames (T, 4) in which the object moves."""
+def gap(px: np.ndarray) -> float | None:
+    """Mean x in pixels from tip to object, of the frames (T, 4) in which the object moves; None if
+    it never does, as by keypoints that have learnt nothing."""
     moving = np.abs(np.gradient(px[:, 2])) > 0.5
+    if not moving.any():
+        return None
     return round(float((px[moving, 2] - px[moving, 0]).mean()), 2)
 
 
