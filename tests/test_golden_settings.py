@@ -149,6 +149,6 @@ def test_settings_that_are_refused_are_refused_as_they_were(golden):
         except InputError as error:
             said[f"{method} {text}"] = str(error)
     args = SimpleNamespace(method="classifier", weights=None,
-                           set=["random_negatives=1", "clip=-2e1", "hold=4", "hold=5"])  # fmt: skip
+                           set=["random_negatives=1", "clip=2e1", "hold=4", "hold=5"])  # fmt: skip
     said["taken"] = str(recipe.read_settings(args, True))
     golden(said)

@@ -15,7 +15,7 @@ from lbw_minimal.imitate import Recipe
 from lbw_minimal.training import InputError
 from tasks.commands import job
 from tasks.commands.job import prepare_folder, videos
-from tasks.commands.recipe import METHODS, fields_of, read_number, recipe_of
+from tasks.commands.recipe import METHODS, fields_of, read_number, read_settings, recipe_of
 
 
 def test_a_new_run_clears_an_older_runs_results_and_nothing_else(tmp_path):
@@ -91,6 +91,19 @@ def test_a_setting_is_a_number_of_its_fields_kind(value, kind, number):
 def test_what_is_no_number_of_that_kind_is_named(value, kind, what):
     with pytest.raises(InputError, match=f"--set x={value}: '{value}' is {what}"):
         read_number(f"x={value}", value, kind)
+
+
+def test_the_logit_that_earns_a_reward_of_1_is_above_0():
+    """By 0 it would be divided once the classifier has learnt; by less, the goal would cost."""
+
+    def given(value):
+        args = Namespace(method="classifier", set=[f"clip={value}"], weights=None)
+        return read_settings(args, from_scratch=False)
+
+    assert given("0.5") == {"clip": 0.5}
+    for value in ("0", "-5"):
+        with pytest.raises(InputError, match=f"--set clip={value}: '{value}' is no number above 0"):
+            given(value)
 
 
 def test_each_method_notes_the_fields_that_it_takes():

@@ -73,6 +73,8 @@ def read_settings(args: argparse.Namespace, from_scratch: bool) -> dict[str, Any
         if name in fixed:
             raise InputError(f"--set {text}: {why}.")
         out[name] = read_number(text, value, str(fields[name].type))
+        if name == "clip" and out[name] <= 0:  # a logit is divided by it
+            raise InputError(f"--set {text}: {value!r} is no number above 0.")
     return out
 
 
