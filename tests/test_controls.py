@@ -147,10 +147,10 @@ def compared(monkeypatch):
         env.limit = steps
         return env
 
-    reward = SimpleNamespace(episode=17)
+    reward, policy = SimpleNamespace(episode=17), SimpleNamespace(act=trained, sizes={"obs_dim": 3})
     monkeypatch.setattr(controls.tasks, "trained_perception", lambda task, weights: "perception")
     monkeypatch.setattr(controls.tasks, "pace_film", lambda *asked: films.append(asked) or "film")
-    monkeypatch.setattr(controls.sac, "load", lambda path: SimpleNamespace(act=trained))
+    monkeypatch.setattr(controls.sac, "load", lambda path: policy)
     monkeypatch.setattr(controls.gym, "make", make)
     monkeypatch.setattr(controls, "watched", lambda env, perception, film: (env, reward))
     monkeypatch.setattr(controls, "rival_wins", lambda *asked: asked)

@@ -112,7 +112,9 @@ def test_controls_play_on_one_core_and_close_a_rivals_world(tmp_path, monkeypatc
 def test_a_policy_from_few_numbers_learns_on_one_core(method, monkeypatch):
     told = []
     args = SimpleNamespace(evaluate=False, jitter=0.0, seed=0, reward="mended", without=None)
-    some = SimpleNamespace(name="push", args=args, demo=[], random=[], recipe=None, run=None)
+    some = SimpleNamespace(
+        name="push", args=args, demo=[], random=[], recipe=None, run=None, weights=None
+    )
     monkeypatch.setattr(run.torch, "set_num_threads", told.append)
     for name in ("imitate", "follow"):
         monkeypatch.setattr(run, name, lambda *_, **__: ("agent", "env"))
@@ -145,6 +147,7 @@ def test_what_has_nothing_red_is_not_painted_and_not_played(monkeypatch):
     monkeypatch.setattr(tasks, "trained_perception", lambda task, weights: None)
     monkeypatch.setattr(tasks, "pace_film", lambda task, seed: None)
     monkeypatch.setattr(robustness.sac, "load", lambda path: None)
+    monkeypatch.setattr(robustness, "refuse_strangers", lambda *_: None)
     wins = robustness.robustness("reach", tasks.WEIGHTS, 3)
     assert "object blue" not in wins and len(wins) == 7 and played == [3] * 7
     assert len(closed) == 8

@@ -1,11 +1,16 @@
 """Under each change the policy sees the changed picture, and nothing else changes."""
 
+from types import SimpleNamespace
+
+import gymnasium as gym
 import numpy as np
 import pytest
 from digests import options
 
 import tasks
-from tasks.commands import JITTER, robustness
+from lbw_minimal import sac
+from lbw_minimal.training import InputError
+from tasks.commands import JITTER, controls, robustness
 
 
 @pytest.fixture(scope="module")
@@ -27,6 +32,7 @@ def seen():
         patch.setattr(tasks, "trained_perception", lambda task, weights: "perception")
         patch.setattr(tasks, "pace_film", lambda task, seed: seed)
         patch.setattr(robustness.sac, "load", lambda path: None)
+        patch.setattr(robustness, "refuse_strangers", lambda *_: None)
         wins = robustness.robustness("push", tasks.WEIGHTS, episodes=3, seed=5)
     assert wins == dict.fromkeys(robustness.CHANGES, 2)
     return dict(zip(wins, first.values(), strict=True)), asked
@@ -104,4 +110,26 @@ def test_what_came_of_each_change_is_a_row_with_its_interval(monkeypatch, capsys
     assert capsys.readouterr().out == (
         "| push | success | 95 % interval |\n| --- | --- | --- |\n"
         "| as trained | 7/8 | 53-98 % |\n| darker | 0/8 | 0-32 % |\n"
+    )
+
+
+@pytest.mark.parametrize("command", [controls, robustness])
+def test_a_policy_that_learnt_by_another_reward_is_refused(command, tmp_path, monkeypatch):
+    """The literal reward's sees the keypoints alone, ten numbers; the mended one's sees 41."""
+    space = gym.spaces.Box(-1, 1, (41,))
+    world = SimpleNamespace(unwrapped=SimpleNamespace(world=None), observation_space=space)
+    sac.save(tmp_path / "policy.safetensors", sac.SAC(10, 3))
+    monkeypatch.setattr(tasks, "trained_perception", lambda *_: None)
+    monkeypatch.setattr(tasks, "pace_film", lambda *_: None)
+    monkeypatch.setattr(command.gym, "make", lambda *_, **__: world)
+    monkeypatch.setattr(command, "watched", lambda *_: (world, None))
+    monkeypatch.setattr(robustness, "TransformObservation", lambda env, *_: env)
+    with pytest.raises(InputError) as told:
+        if command is controls:
+            controls.compare("push", tmp_path, 0.01, 1, 0, {})
+        else:
+            robustness.robustness("push", tmp_path, 1)
+    assert str(told.value) == (
+        f"{tmp_path}: that policy sees 10 numbers, and 41 come with the mended reward; give one "
+        "that learnt by that."
     )

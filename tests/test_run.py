@@ -132,7 +132,9 @@ def test_a_policy_learns_with_the_jitter_the_reward_and_the_mends_that_were_aske
 
     monkeypatch.setattr(run, "imitate", imitate)
     args = SimpleNamespace(evaluate=False, jitter=0.01, seed=4, reward="literal", without="trim")
-    some = SimpleNamespace(name="reach", args=args, demo="demo", recipe="recipe", run="run")
+    some = SimpleNamespace(
+        name="reach", args=args, demo="demo", recipe="recipe", run="run", weights="w"
+    )
     monkeypatch.setattr(run.gym, "make", lambda id, jitter: Counted() if jitter == 0.01 else None)
     assert run.learn(some, "perception", "robot") == (agent, given["env"])
     assert given["frames"] == ("demo", "robot", "perception", "recipe")

@@ -25,7 +25,7 @@ from lbw_minimal.report import wilson
 from lbw_minimal.training import InputError, counted, write_atomic
 from tasks.commands import JITTER, Parser, at_least, make_folder, metres
 from tasks.commands.job import check_task
-from tasks.commands.run import TEST_SEED
+from tasks.commands.run import TEST_SEED, refuse_strangers
 from tasks.commands.table import METHODS, markdown
 from tasks.world import SIZE, TaskEnv
 
@@ -140,7 +140,6 @@ def best(env: gym.Env, robots: list[Robot], trials: int) -> Robot:
 def rival_wins(task: str, run: Path, jitter: float, episodes: int) -> int:
     """Successful episodes of another method's policy; run: the folder of its run."""
     env: gym.Env = gym.make(tasks.id_of(task), jitter=jitter)
-    policy: sac.Policy
     if settings(run)["method"] == "tracks":
         demo, _ = video.read(tasks.VIDEOS / task / "expert_01.mp4")
         env, _ = follow.watched(env, demo, tasks.pace_film(task, settings(run)["seed"]))
@@ -181,6 +180,7 @@ def compare(
         return policy.act(obs, deterministic=True)
 
     env, reward = seen_through()
+    refuse_strangers(weights, policy, env)
     found = {"the policy": wins(env, trained, episodes)}
     for name, run in beside.items():
         found[name] = rival_wins(task, run, jitter, episodes)

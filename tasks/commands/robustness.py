@@ -21,7 +21,7 @@ from lbw_minimal import sac
 from lbw_minimal.imitate import watched
 from lbw_minimal.report import wilson
 from tasks.commands import JITTER, Parser, at_least
-from tasks.commands.run import evaluate
+from tasks.commands.run import evaluate, refuse_strangers
 from tasks.commands.table import markdown
 from tasks.world import RED, TaskEnv, World
 
@@ -104,6 +104,7 @@ def robustness(task: str, weights: Path, episodes: int, seed: int = 0) -> dict[s
             env.close()
             continue
         env, _ = watched(TransformObservation(env, change, None), perception, robot)
+        refuse_strangers(weights, policy, env)
         rows, *_ = evaluate(policy, env, episodes)
         wins[name] = sum(row["success"] for row in rows)
         env.close()

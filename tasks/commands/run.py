@@ -10,6 +10,7 @@ import json
 import shutil
 import time
 from itertools import islice
+from pathlib import Path
 from typing import Any, cast
 
 import gymnasium as gym
@@ -127,7 +128,7 @@ def learn(job: Job, perception: Perception, robot: np.ndarray) -> tuple[sac.Poli
         job.demo, robot, perception, job.recipe,
         seed=job.args.seed, run=job.run, form=job.args.reward, without=job.args.without,
     )  # fmt: skip
-    refuse_strangers(job, agent, env, "--reward")
+    refuse_strangers(job.weights, agent, env, "--reward")
     return agent, env
 
 
@@ -139,16 +140,19 @@ def track(job: Job) -> tuple[sac.Policy, gym.Env, dict[str, Any]]:
         bring(job, "policy")
     env: gym.Env = gym.make(tasks.id_of(job.name), jitter=job.args.jitter)
     agent, env = follow(env, job.demo, robot, job.recipe, seed=job.args.seed, run=job.run)
-    refuse_strangers(job, agent, env, "--method")
+    refuse_strangers(job.weights, agent, env, "--method")
     return agent, env, {"demo": tracks.draw(job.demo)}
 
 
-def refuse_strangers(job: Job, agent: sac.Policy, env: gym.Env, option: str) -> None:
-    """Raise InputError if the policy was trained to see something else than `env` shows."""
+def refuse_strangers(weights: Path, agent: sac.Policy, env: gym.Env, option: str = "") -> None:
+    """Raise InputError if the policy in `weights` was trained to see something else than `env`
+    shows: what goes with an option of the run, or else with the mended reward."""
     sees, given = agent.sizes["obs_dim"], cast(Box, env.observation_space).shape[0]
     if sees != given:
-        why = f"that policy sees {sees} numbers, and {given} come with this {option[2:]}"
-        raise InputError(f"{job.weights}: {why}; give the {option} it was trained with.")
+        this = f"this {option[2:]}" if option else "the mended reward"
+        remedy = f"the {option} it was trained with" if option else "one that learnt by that"
+        why = f"that policy sees {sees} numbers, and {given} come with {this}"
+        raise InputError(f"{weights}: {why}; give {remedy}.")
 
 
 def test(job: Job, agent: sac.Policy, env: gym.Env) -> tuple[dict[str, Any], str]:
