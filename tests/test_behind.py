@@ -79,6 +79,21 @@ def test_in_a_few_frames_it_is_put_behind_the_object_and_nothing_is_said():
     assert behind(wrong, lay(wrong, SCENE), SCENE)[1].warnings == []
 
 
+@pytest.mark.parametrize(("share", "all_of_them"), [(0.4, False), (0.6, True)])
+def test_where_it_mostly_was_on_the_object_it_is_put_behind_all_along(share, all_of_them):
+    """In the other frames its dot is as far off as the object's corner or its shadow."""
+    moving = np.flatnonzero(MOVES)
+    few = moving[: round(share * len(moving))]
+    wrong, beside = on_the_object(few), RIGHT.object + (-0.06 * SIDE, 0.05 * SIDE)
+    tip = wrong.tip.copy()
+    tip[moving[len(few) :]] = beside[moving[len(few) :]]
+    tracks, found = put_behind(replace(wrong, tip=tip), TOUCH, THERE)
+    assert found == pytest.approx(len(few) / len(moving))
+    off = (tracks.tip - RIGHT.object)[moving[len(few) :]] / SIDE
+    want = (-BEHIND, 0) if all_of_them else (-0.06, 0.05)
+    np.testing.assert_allclose(off, np.tile(want, (len(off), 1)), atol=4e-3)
+
+
 def test_a_tip_found_on_the_object_at_rest_is_put_between_those_elsewhere():
     early = (RIGHT.times > 0.3) & (RIGHT.times < 0.5)
     tracks, share = put_behind(on_the_object(early), TOUCH, THERE)
