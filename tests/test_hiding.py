@@ -1,9 +1,11 @@
 """Whether what is pushed is in sight: a thing of 13 pixels that goes 60 pixels across a table."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from lbw_minimal.clips.hiding import alike, unlike
+from lbw_minimal.clips.hiding import _cut, alike, unlike
 from lbw_minimal.clips.paths import Tracks
 
 T, TOUCH, THERE = 40, 1.0, 3.0  # frames, and s at 10 frames a second
@@ -35,6 +37,23 @@ def test_what_a_hand_hides_on_its_way_does_not():
     assert alike(frames, tracks, TOUCH, THERE) < 0.3
     (said,) = unlike(frames, tracks, TOUCH, THERE)
     assert said.endswith("does the hand hide it?")
+
+
+@pytest.mark.parametrize("hidden", [False, True])
+def test_in_a_large_film_it_is_as_alike_as_in_a_small_one(hidden):
+    """Four times as many pixels either way, of which a patch is as large a part."""
+    frames, tracks = filmed((TIMES > TOUCH) & hidden)
+    large = replace(tracks, tip=4 * tracks.tip, object=4 * tracks.object, side=400)
+    found = alike(frames.repeat(4, axis=1).repeat(4, axis=2), large, TOUCH, THERE)
+    assert found == pytest.approx(alike(frames, tracks, TOUCH, THERE), abs=0.05)
+
+
+def test_a_square_at_the_edge_is_moved_into_the_frame_whole():
+    frame = np.arange(20 * 30 * 3).reshape(20, 30, 3)
+    for place, (top, left) in {(0, 0): (0, 0), (29, 19): (7, 17), (31, 3): (0, 17),
+                               (12, 9): (3, 6)}.items():  # fmt: skip
+        square = _cut(frame, np.array(place, float), 6)
+        np.testing.assert_array_equal(square, frame[top : top + 13, left : left + 13])
 
 
 @pytest.mark.parametrize(("share", "hides"), [(0.3, False), (0.7, True)])
