@@ -379,6 +379,23 @@ def test_slow_motion_is_a_hundred_frames_a_second_and_twice_the_films_own(
     assert clip.times[-1] == pytest.approx(0.2 / slow) and bool(clip.notes) == (slow != 1)
 
 
+@pytest.mark.parametrize(("said", "first", "last"), [({clips.CAPTURED: "200"}, 50, 75), ({}, 7, 9)])
+def test_a_piece_of_slow_motion_is_asked_for_by_the_seconds_that_it_comes_with(
+    said, first, last, tmp_path, monkeypatch
+):
+    """At 25 of 200 frames a second it is read as half a second, of which the third quarter is asked
+    for; the film itself takes four. A click into `prepare`'s page writes seconds so."""
+    path = encode(tmp_path / "a.mp4", reach(100))
+    look = clips.look
+    monkeypatch.setattr(clips, "look", lambda path: (look(path)[0], look(path)[1] | said))
+    whole = read_clip(path, cuts=False)
+    piece = read_clip(path, start=0.25, end=0.375, cuts=False)
+    inside = np.flatnonzero((whole.times >= 0.25) & (whole.times <= 0.375))
+    assert [*inside[[0, -1]]] == [first, last]
+    np.testing.assert_array_equal(piece.frames, whole.frames[inside])
+    np.testing.assert_allclose(piece.times, whole.times[inside] - whole.times[inside[0]], atol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("shown", "taken"),
     [

@@ -51,10 +51,11 @@ def read_clip(
 ) -> Clip:
     """The clip in a file. What the arguments leave open is found out.
 
-    start, end: the piece to read, in seconds. stream: 1 for the file's first stream of pictures.
-    turn: degrees clockwise, 0, 90, 180 or 270. crop: whether black borders are cut off. cuts:
-    whether cuts are looked for, which takes most of the time. Raises InputError, a sentence with a
-    remedy, if there is no film in the file or it is cut short.
+    start, end: the piece to read, in seconds; of slow motion at true speed, as the clip's times.
+    stream: 1 for the file's first stream of pictures. turn: degrees clockwise, 0, 90, 180 or 270.
+    crop: whether black borders are cut off. cuts: whether cuts are looked for, which takes most of
+    the time. Raises InputError, a sentence with a remedy, if there is no film in the file or it is
+    cut short.
     """
     path = Path(path)
     streams, said = look(path)
@@ -62,16 +63,18 @@ def read_clip(
         raise InputError(f"{path}: stream {stream} is not among its {len(streams)} of pictures.")
     best, rank, failed = None, (False, 0), list[InputError]()
     for number in range(1, len(streams) + 1) if stream is None else [stream]:
-        film = _Film(path, streams[number - 1], start, end, turn, crop)
+        its = streams[number - 1]
+        first, last = (None if s is None else s * _slow(its, said) for s in (start, end))
+        film = _Film(path, its, first, last, turn, crop)
         try:
             film.read()
         except InputError as error:
             failed.append(error)
             continue
         # Another stream may be a title, a preview, a map of depths: motion first, then size.
-        its = len(streams) == 1 or motion.moves(film.frames), film.stream.width
-        if best is None or its > rank:
-            best, rank = film, its
+        here = len(streams) == 1 or motion.moves(film.frames), film.stream.width
+        if best is None or here > rank:
+            best, rank = film, here
             where = number
     if best is None:
         raise failed[0]
@@ -81,10 +84,10 @@ def read_clip(
         )
     times = _rising(best)
     keep = np.diff(times, prepend=times[0] - 1) > 0
-    frames, times = best.frames[keep], times[keep] - times[0]
-    captured = float(said.get(CAPTURED, 0))
-    if captured >= 100 and captured > 2 * best.stream.rate:
-        times = times * best.stream.rate / captured
+    slow = _slow(best.stream, said)
+    frames, times = best.frames[keep], (times[keep] - times[0]) / slow
+    if slow > 1:
+        captured = float(said[CAPTURED])
         best.notes.append(f"Slow motion of {captured:g} frames a second was played at true speed.")
     if len(frames) < 2:
         raise InputError(
@@ -93,6 +96,12 @@ def read_clip(
         )
     jumps = motion.jumps(frames, times) if cuts else []
     return Clip(frames, times, jumps, best.notes, best.losses)
+
+
+def _slow(stream: Stream, said: dict[str, str]) -> float:
+    """How many times as long the film takes as what it shows: 1 if it is no slow motion."""
+    captured = float(said.get(CAPTURED, 0))
+    return captured / stream.rate if captured >= 100 and captured > 2 * stream.rate else 1.0
 
 
 def steady(clip: Clip) -> Clip:

@@ -182,8 +182,7 @@ def compare(
     env, reward = seen_through()
     refuse_strangers(weights, policy, env)
     found = {"the policy": wins(env, trained, episodes)}
-    for name, run in beside.items():
-        found[name] = rival_wins(task, run, jitter, episodes)
+    found |= {name: rival_wins(task, run, jitter, episodes) for name, run in beside.items()}
     frozen, grey = (seen_through(camera)[0] for camera in (Frozen, Grey))
     found["its camera frozen"] = wins(frozen, trained, episodes)
     found["its camera grey"] = wins(grey, trained, episodes)
