@@ -257,6 +257,11 @@ def test_a_long_film_is_read_where_it_moves(tmp_path, monkeypatch):
         assert shows(clip.frames[:15], arm(np.full(15, 0.1))) < 8
         assert shows(clip.frames[-15:], arm(np.full(15, 0.6))) < 8
         assert "the longest stretch in which something moves" in clip.losses[-1]
+        # by the seconds at which it begins and ends it can be asked for, as by clicks
+        end = clip.start + clip.times[-1]
+        again = read_clip(tmp_path / "a.mp4", start=clip.start, end=end + 1e-3, cuts=False)
+        assert clip.start > 4 and again.start == clip.start
+        np.testing.assert_array_equal(again.frames, clip.frames)
 
 
 def test_memory_does_not_grow_with_the_length(tmp_path, monkeypatch):
@@ -346,7 +351,7 @@ def test_times_that_fall_back_by_three_seconds_are_of_another_recording(back, se
 class Film:
     """A film of three frames that are as bright as their stream is wide."""
 
-    every, stamps = 1, (0.0, 0.1, 0.2)
+    every, stamps, start = 1, (0.0, 0.1, 0.2), 0.0
 
     def __init__(self, path, stream, *options):
         self.stream, self.notes, self.losses = stream, [], []
@@ -394,6 +399,7 @@ def test_a_piece_of_slow_motion_is_asked_for_by_the_seconds_that_it_comes_with(
     assert [*inside[[0, -1]]] == [first, last]
     np.testing.assert_array_equal(piece.frames, whole.frames[inside])
     np.testing.assert_allclose(piece.times, whole.times[inside] - whole.times[inside[0]], atol=1e-9)
+    assert (whole.start, piece.start) == (0, 0.25)
 
 
 @pytest.mark.parametrize(
@@ -431,7 +437,7 @@ def test_a_pause_of_three_seconds_belongs_to_a_motion_and_a_longer_one_ends_it(p
 
 def test_of_frames_at_one_moment_the_first_is_kept(monkeypatch):
     class Film:
-        every, notes, losses = 1, [], []
+        every, start, notes, losses = 1, 0.0, [], []
         stamps = [0.5, 0.54, 0.54, 0.58, 0.62]
         frames = np.arange(5, dtype=np.uint8).reshape(5, 1, 1, 1)
 

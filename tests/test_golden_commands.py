@@ -284,7 +284,8 @@ def test_a_piece_of_a_clip_is_read_and_keeps_the_clips_own_seconds(monkeypatch, 
 
     def read(path, **more):
         told.append((path, more))
-        return Clip(levels(4), np.arange(4) / 10, [], ["read"], ["left out"])
+        start = more["start"] or 0.0
+        return Clip(levels(4), np.arange(4) / 10, [], ["read"], ["left out"], start)
 
     def take(result):
         own.clip = result.clip

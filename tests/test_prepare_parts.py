@@ -492,6 +492,19 @@ def test_a_refused_clip_is_told_what_is_poor_about_its_light(light, monkeypatch)
     assert result.why_not == f"{FEW}{light}" and asked[-1][1].tolist() == [2, 3, 4, 5]
 
 
+def test_a_piece_has_the_files_own_seconds_by_which_a_click_asks_for_less_of_it(monkeypatch):
+    """Forty seconds into a film too long for memory something moves."""
+    monkeypatch.setattr(prepare, "read_clip", lambda path, **more: replace(clip(), start=40.0))
+    monkeypatch.setattr(prepare, "is_own", lambda *what: False)
+
+    def unusable(result, choices):
+        raise Unusable("no arm is seen", "film one")
+
+    monkeypatch.setattr(prepare, "follow", unusable)
+    times = prepare.prepare("push", "a.mp4").clip.times
+    assert times == pytest.approx(40 + np.arange(6) / 20)
+
+
 def test_84_pixels_are_enough_and_83_are_not(monkeypatch):
     checked = []
     monkeypatch.setattr(

@@ -37,6 +37,7 @@ class Clip:
     cuts: list[int]  # indices of the frames that do not continue the one before
     notes: list[str]  # what was done, a sentence each
     losses: list[str] = field(default_factory=list)  # what was left out or guessed, likewise
+    start: float = 0.0  # s of the file, at true speed, at which the piece that was read begins
 
 
 def read_clip(
@@ -95,7 +96,7 @@ def read_clip(
             "does the task."
         )
     jumps = motion.jumps(frames, times) if cuts else []
-    return Clip(frames, times, jumps, best.notes, best.losses)
+    return Clip(frames, times, jumps, best.notes, best.losses, best.start / slow)
 
 
 def _slow(stream: Stream, said: dict[str, str]) -> float:

@@ -126,7 +126,7 @@ def prepare(name: str, path: Path, choices: Choices | None = None) -> Prepared:
     """
     choices = choices or Choices()
     clip = read_clip(path, start=choices.first or None, end=choices.last)
-    clip = replace(clip, times=clip.times + choices.first)
+    clip = replace(clip, times=clip.times + clip.start)
     env = tasks.bare(name, embodiment="human")
     try:
         first, _ = env.reset(seed=0)
