@@ -54,6 +54,7 @@ def test_listed_faults_were_noticed_as_often_as_their_tables_say():
         "first": "the first 48, before", "fresh": "65 others, after", "third": "80 others, before",
         "second, before": "the first 26, before", "second, after": "70 others, after",
         "fourth": "91 of the core", "fifth": "120 others, with golden figures",
+        "sixth": "80 of an outsider",
     }.items():  # fmt: skip
         cells = PAGE.split(f"\n| {row} | ")[1].split("\n")[0].split(" | ")
         (k, n), *of_kinds = noticed(sets.pop(of))
