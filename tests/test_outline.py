@@ -104,3 +104,19 @@ def test_a_tip_that_is_sure_before_an_arm_is_inside_says_nothing():
     waits = np.arange(40) < 20
     found = reaching(comes_in("left", np.where(waits, 0, 100)), found_at(waits))
     assert found.tip_sure.tolist() == (~waits).tolist()
+
+
+def test_a_tip_that_is_found_late_came_by_the_way_of_its_outline():
+    """It is found from half of the way on, eight pixels beside the outline's, and once before the
+    arm is inside, where nothing is."""
+    frames = comes_in("left")
+    tip, inside = far_end(frames)
+    came, late = int(inside.argmax()), 20
+    sure = np.where(np.arange(40) < late, 0.2, 0.9)
+    sure[2] = 0.9
+    path = np.where(np.arange(40)[:, None] < late, 0, tip + (0, 8))
+    found = reaching(frames, Found(path, path, sure, sure))
+    assert found.tip_sure.tolist() == [0] * came + [1] * (late - came) + [0.9] * (40 - late)
+    off = np.stack([np.zeros(late - came), np.linspace(0, 8, late - came, endpoint=False)], axis=1)
+    np.testing.assert_allclose(found.tip[came:late] - tip[came:late], off, atol=1e-9)
+    assert np.array_equal(found.tip[late:], path[late:])

@@ -24,14 +24,31 @@ RARELY = 0.5  # of the frames in which an arm is inside: a tip that is sure in f
 
 def reaching(frames: np.ndarray, found: Found) -> Found:
     """Found in the frames (T, H, W, 3) uint8 of a hand that touches nothing, with the tip of its
-    outline where the one that was found is rarely sure, or ends near where it began."""
+    outline where the one that was found is rarely sure, or ends near where it began. One that is
+    found late has the way by which it came from its outline."""
     tip, inside = far_end(frames)
     sure, least = found.tip_sure >= SURE, LITTLE * min(frames.shape[1:3])
     rarely = (sure & inside).sum() < RARELY * inside.sum()
     rests = _gone(found.tip[sure]) < least < extent(tip[inside])
-    if inside.mean() < TIP_FOUND or not (rarely or rests):
+    if inside.mean() < TIP_FOUND:
         return found
+    if not (rarely or rests):
+        return _from_where_it_came(found, tip, inside)
     return replace(found, tip=tip, tip_sure=inside.astype(np.float32))
+
+
+def _from_where_it_came(found, tip, inside):
+    """Found, led on from the outline's tip (T, 2) where that has come inside (T,) and is not yet
+    sure. Nothing is sure before that: what was found there is no hand."""
+    came = int(inside.argmax())
+    late = int((inside & (found.tip_sure >= SURE)).argmax())
+    if late == came:
+        return found
+    path, sure = found.tip.copy(), found.tip_sure.copy()
+    nearer = np.linspace(0, 1, late - came, endpoint=False)[:, None]
+    path[came:late] = tip[came:late] + nearer * (found.tip[late] - tip[late])
+    sure[:came], sure[came:late] = 0, inside[came:late]
+    return replace(found, tip=path, tip_sure=sure)
 
 
 def _gone(path):
