@@ -81,6 +81,8 @@ def test_a_film_that_prepare_made_brings_its_page_with_links_of_the_runs_own(tmp
     assert (run / "reenactment.mp4").read_bytes() == b"as it is learnt from"
     assert bring(tmp_path, "push", clip, run / "reenactment.mp4") == NOTE  # so has the run's film
     assert bring(run, "push", clip, run / "reenactment.mp4") == NOTE  # where it lies already
+    again = tmp_path / "made" / ".." / "run"  # the same place
+    assert bring(again, "push", clip, run / "reenactment.mp4") == NOTE
 
 
 def test_any_other_clip_gets_a_page_of_its_own(tmp_path, monkeypatch):

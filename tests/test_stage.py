@@ -12,7 +12,7 @@ import pytest
 import tasks
 from lbw_minimal import video
 from tasks.__main__ import main
-from tasks.commands.stage import outlines, page
+from tasks.commands.stage import _contours, outlines, page
 
 
 def box(polygons):
@@ -148,3 +148,12 @@ def test_a_browser_records_what_its_camera_sees(tmp_path):
     frames = video.read(tmp_path / name)[0]
     places = [np.argwhere(frame.mean(-1) > 180).mean(0) for frame in frames]
     assert len(frames) > 20 and np.ptp(places, axis=0)[1] > 40 > 5 > np.ptp(places, axis=0)[0]
+
+
+def test_an_outline_has_no_specks():
+    """A square of 6 by 6 pixels of a frame, and beside it one that is smaller than a pixel."""
+    mask = np.zeros((80, 80), bool)
+    mask[8:32, 8:32] = True
+    mask[40:44, 40:44] = True
+    (polygon,) = _contours(mask)
+    assert np.ptp(np.array(polygon), axis=0) == pytest.approx((6, 6), abs=0.3)
