@@ -32,7 +32,7 @@ def read(monkeypatch):
 
             return SimpleNamespace(
                 read=decode, frames=frames, stamps=list(np.arange(10) / rate), stream=stream,
-                every=1, notes=[f"stream {stream.index}"], losses=[],
+                every=1, start=0.0, notes=[f"stream {stream.index}"], losses=[],
             )  # fmt: skip
 
         monkeypatch.setattr(reader, "look", lambda path: (known, said or {}))
