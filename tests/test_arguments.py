@@ -11,9 +11,11 @@ from tests.grade.cell.answer import PREAMBLE, state
 from tests.grade.exercise import everything, find
 from tests.grade.judge import CHANGES, judge
 from tests.grade.notebook import here
-from tests.grade.sandbox import Sandbox
 from tests.grade.submission import Answer
+from tests.kept import Kept
 from tests.test_answers import FUNCTIONS, parameters
+
+pytestmark = pytest.mark.usefixtures("workers_wait")
 
 ALL = everything()
 FREE = {("2.3", "target")}  # the text asks for it to be changed
@@ -108,7 +110,7 @@ def test_what_was_changed_is_said_in_the_notebook_and_by_the_grader(how):
     head, body = source.split("\n", 1)
     source = f"{head}\n{line}{body}"
     there = judged(ALL[id], source)
-    with Sandbox() as box:
+    with Kept() as box:
         graded = grade_one(ALL[id], Answer(source, [], ""), box, 0)
     for result in (there, graded):
         assert result.points < result.most
@@ -129,7 +131,7 @@ def test_an_answer_that_calls_itself_may_change_what_is_its_own():
         "    if not own:\n        return success_rate(distances.copy(), threshold, True)\n"
         "    distances -= threshold\n    return (distances < 0).mean()"
     )
-    with Sandbox() as box:
+    with Kept() as box:
         result = grade_one(find("0.1"), Answer(source, [], ""), box, 0)
     assert result.points == result.most, result.lines()
 

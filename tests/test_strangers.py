@@ -99,6 +99,7 @@ def test_the_truth_is_in_the_pixels_of_the_clip_as_it_is_read(task, tmp_path):
 # Filmed kinds are what they say.
 
 
+@functools.cache
 def told(kind, task="push", seed=0):
     """A story's moments, where its arms' tips got to (n, arms, 3) m, and how many pixels of the
     thing and of each arm the kit's camera sees then, (n, 1 + arms)."""

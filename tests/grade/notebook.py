@@ -127,7 +127,8 @@ def _swapped(space: dict, there: dict, gone: Iterable[str]):
 @contextmanager
 def _hidden():
     """No module of the package can be imported."""
-    ours = {name: m for name, m in sys.modules.items() if name.split(".")[0] in FORBIDDEN}
+    near = [name for name in sys.modules if name.startswith(FORBIDDEN)]  # of thousands: quickly
+    ours = {name: sys.modules[name] for name in near if name.split(".")[0] in FORBIDDEN}
     hook = Hidden()
     for name in ours:
         del sys.modules[name]
