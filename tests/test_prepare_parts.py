@@ -113,7 +113,7 @@ def test_a_clip_refused_for_what_was_found_in_it_can_be_corrected_by_a_click(
     assert prepare.main(["push", str(tmp_path / "a.mp4"), "--out", str(tmp_path)]) == 2
     assert capsys.readouterr().out.splitlines() == [
         "not usable: the object never moves.", f"page: {tmp_path / 'page'}",
-        *["or else: if a dot on the page is wrong, click there where it should be"] * said,
+        *["or else: if a dot on the page is wrong, click it right, and run what it says"] * said,
     ]  # fmt: skip
 
 

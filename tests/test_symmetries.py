@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 
 from lbw_minimal.clips import camera, footage, motion, paths, retarget
+from lbw_minimal.clips.detector import Detector
 from lbw_minimal.clips.paths import Tracks, interpolate, low_pass
 from lbw_minimal.clips.retarget import Scene, lay
+from lbw_minimal.clips.sight import Sight
 from tasks.commands import prepare
 from tests import toy_pushes
 from tests.toy_clips import arm, room
@@ -282,8 +284,10 @@ def test_an_arm_comes_in_from_the_other_side_in_a_mirror():
     mirrored = np.ascontiguousarray(frames[:, :, ::-1])
     one, other = footage.check(frames), footage.check(mirrored)
     assert (one.unmoved, one.warnings) == (other.unmoved, other.warnings)
+    model = Detector.load(prepare.EYES)
     arms, theirs = (
-        prepare.coming_in(f, seen.off) for f, seen in ((frames, one), (mirrored, other))
+        prepare.coming_in(Sight(model, f), seen.off)
+        for f, seen in ((frames, one), (mirrored, other))
     )
     assert arms.enters < 0.1 and theirs.enters == pytest.approx(1 - arms.enters, abs=0.02)
     assert arms.seen == theirs.seen and arms.moves == theirs.moves

@@ -57,11 +57,12 @@ CLICK = f"""
 <p>Is a dot wrong? Choose which, click where it should be, and run the command below.</p>
 <details><summary>How far a click reaches</summary>
 <p>Another click into the same picture replaces the first. Two or three pictures are enough where a
-dot is beside its place: between your first and your last click the correction is interpolated.
-Beyond them it fades out: within {FADE:g} s where the dot was full, by the next full dot where it
-was hollow, and where the clip jumps. All else stays as it was found. So click also on a dot that is
-right, where a correction should end. Is a dot on something else all along? Click into every picture
-from just before it should move until the last.</p></details>
+dot is beside its place, the last picture among them if it is wrong there: between your first and
+your last click the correction is interpolated. Beyond them it fades out: within {FADE:g} s where
+the dot was full, by the next full dot where it was hollow, and where the clip jumps. All else stays
+as it was found. So click also on a dot that is right, where a correction should end. Is a dot on
+something else all along? Click into every picture until the last, from just before it should move,
+or from the first if it never does.</p></details>
 """
 CUT = """
 <p>Is a part of the clip to be left out? Choose the first or the last picture to use, and click it.

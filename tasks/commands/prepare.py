@@ -112,7 +112,7 @@ def main(argv: list[str]) -> int:
         print(f"warning: {warning}")
     if result.why_not:
         if result.tracks is not None and correctable(result.tracks):
-            print("or else: if a dot on the page is wrong, click there where it should be")
+            print("or else: if a dot on the page is wrong, click it right, and run what it says")
         return 2
     print(f"learn: {learn}")
     return 0
