@@ -108,6 +108,19 @@ def test_a_piece_is_that_in_which_the_hand_or_what_it_touched_is_seen(touched, f
     assert (piece.times[0], piece.times[-1]) == (first / 25, last / 25)
 
 
+@pytest.mark.parametrize(("touched", "said"), [
+    (False, "the hand is in sight for 7 frames in one go, too few: 8 are needed"),
+    (True, "hand or object is in sight for 6 frames in one go, too few: 8 are needed"),
+])  # fmt: skip
+def test_a_clip_long_enough_in_which_too_little_is_seen_is_not_called_too_short(touched, said):
+    """A hand in 7 of 18 frames; and a thing and a hand, both in 12, of which 6 come after a cut."""
+    sure = np.full(18, 0.4)
+    sure[3 : 15 if touched else 10] = 1.0
+    cut = tracks(np.where(np.arange(18) < 9, 10.0, 60.0), sure=sure, cuts=(9,) * touched)
+    with pytest.raises(Unusable, match=f"^{said}"):
+        busiest_piece(cut, touched, [])
+
+
 @pytest.mark.parametrize(("jump", "is_cut"), [(3, False), (5, True)])
 def test_a_change_of_the_picture_is_a_cut_where_something_jumps_by_a_25th_of_the_side(jump, is_cut):
     tip = np.concatenate([np.full(10, 30.0), np.full(10, 30.0 + jump)])

@@ -19,8 +19,8 @@ from tasks.commands.links import mark
 from tasks.commands.prepare import Prepared, follow
 
 FEW = (
-    "6 frames are too few, even without cuts 8 are needed; film the whole motion in one go, at 10 "
-    "frames a second or more."
+    "6 frames are too few: 8 are needed; film the whole motion in one go, at 10 frames a second or "
+    "more."
 )
 ONE = Arms(1.0, 0.0, 0.5, True, 0.0)  # arms that come in
 NONE = Arms(0.0, 0.0, np.nan, False, 0.0)

@@ -347,7 +347,9 @@ def short_pieces():
     tracks = clip()
     cuts = tuple(range(5, 78, 5))
     jumps = 100 * (np.searchsorted(cuts, np.arange(len(tracks.times)), side="right") % 2)
-    return replace(tracks, tip=tracks.tip + jumps[:, None], cuts=cuts), "frames are too few"
+    return replace(
+        tracks, tip=tracks.tip + jumps[:, None], cuts=cuts
+    ), "5 frames in one go, too few"
 
 
 def from_above():

@@ -153,19 +153,23 @@ def busiest_piece(tracks: Tracks, touched: bool, warnings: list[str]) -> Tracks:
     A cut is a frame at which the picture changes all at once, and tip or object jump. Most happens
     where the object goes farthest, or the tip where nothing is touched.
     """
-    cuts = _cuts(tracks)
+    cuts, spans = _cuts(tracks), [0]
     pieces = []
     for first, last in zip([0, *cuts], [*cuts, len(tracks.times)], strict=True):
         sure = tracks.tip_sure[first:last] >= SURE
         if touched:  # a hit thing goes on without the hand
             sure |= tracks.object_sure[first:last] >= SURE
         seen = first + np.flatnonzero(sure)
-        if len(seen) and seen[-1] + 1 - seen[0] >= LEAST_FRAMES:
+        spans.append(int(np.ptp(seen)) + 1 if len(seen) else 0)
+        if spans[-1] >= LEAST_FRAMES:
             pieces.append(tracks.part(seen[0], seen[-1] + 1))
     if not pieces:
         check_tip(tracks)
+        said, hand = f"{len(tracks.times)} frames are", "hand or object" if touched else "the hand"
+        if len(tracks.times) >= LEAST_FRAMES:
+            said = f"{hand} is in sight for {quantity(max(spans), 'frame')} in one go,"
         raise Unusable(
-            f"{len(tracks.times)} frames are too few, even without cuts {LEAST_FRAMES} are needed",
+            f"{said} too few: {LEAST_FRAMES} are needed",
             "film the whole motion in one go, at 10 frames a second or more",
         )
     best = max(pieces, key=lambda piece: _extent(piece, "object" if touched else "tip"))
