@@ -153,6 +153,13 @@ def test_an_arm_that_stays_where_a_thing_was_does_not_hide_it():
     seen(clip)
 
 
+def test_what_stands_in_the_last_frame_has_not_left():
+    """A film that runs in a loop ends with the picture it begins with."""
+    loop = film()
+    loop[-1] = loop[0]
+    assert vanished.vanished(film()) is not None and vanished.vanished(loop) is None
+
+
 def test_what_stood_where_the_hand_was_first_is_the_hand():
     gone = film(hides=lambda t: t >= COMES)
     place = vanished.vanished(gone).places[0]

@@ -62,6 +62,8 @@ def vanished(frames: np.ndarray) -> Vanished | None:
     off = changed[:, thing].mean(axis=1)  # (n,)
     stands, covered = np.flatnonzero(off < COVERED), np.minimum(off, other.mean(axis=1)) >= COVERED
     left = int(stands[-1]) + 1 if len(stands) else 0
+    if left == len(k):  # a loop, which ends as it begins
+        return None
     y, x = np.nonzero(thing)
     box = slice(max(0, y.min() - 1), y.max() + 2), slice(max(0, x.min() - 1), x.max() + 2)
     patch, mask = first[box].astype(np.uint8), thing[box].astype(np.uint8)
