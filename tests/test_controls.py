@@ -12,7 +12,7 @@ import tasks
 from lbw_minimal import classifier, rivals, sac, sac_ae
 from lbw_minimal.classifier import GoalClassifier
 from lbw_minimal.training import InputError
-from tasks.commands import JITTER, controls
+from tasks.commands import JITTER, controls, job
 from tasks.commands.run import TEST_SEED
 
 
@@ -390,7 +390,7 @@ def test_a_run_beside_is_known_by_its_settings(tmp_path):
                          ("tracks", "Object tracks")):  # fmt: skip
         (tmp_path / "settings.json").write_text(json.dumps({"method": method, "seed": 2}))
         assert controls.method_of(tmp_path) == name
-    assert controls.settings(tmp_path) == {"method": "tracks", "seed": 2}
+    assert job.settings_of(tmp_path) == {"method": "tracks", "seed": 2}
 
 
 def test_of_each_method_one_run_of_the_task_itself_is_tested_beside_it(tmp_path, monkeypatch):

@@ -24,7 +24,7 @@ from lbw_minimal.imitate import watched
 from lbw_minimal.report import wilson
 from lbw_minimal.training import InputError, counted, write_atomic
 from tasks.commands import JITTER, Parser, at_least, make_folder, metres
-from tasks.commands.job import check_task
+from tasks.commands.job import check_task, settings_of
 from tasks.commands.run import TEST_SEED, refuse_strangers
 from tasks.commands.table import METHODS, markdown
 from tasks.world import SIZE, TaskEnv
@@ -140,9 +140,9 @@ def best(env: gym.Env, robots: list[Robot], trials: int) -> Robot:
 def rival_wins(task: str, run: Path, jitter: float, episodes: int) -> int:
     """Successful episodes of another method's policy; run: the folder of its run."""
     env: gym.Env = gym.make(tasks.id_of(task), jitter=jitter)
-    if settings(run)["method"] == "tracks":
+    if settings_of(run)["method"] == "tracks":
         demo, _ = video.read(tasks.VIDEOS / task / "expert_01.mp4")
-        env, _ = follow.watched(env, demo, tasks.pace_film(task, settings(run)["seed"]))
+        env, _ = follow.watched(env, demo, tasks.pace_film(task, settings_of(run)["seed"]))
         policy = sac.load(run / "policy.safetensors")
     else:
         policy, env = rivals.replayed(env, run, task)
@@ -247,15 +247,9 @@ def main(argv: list[str]) -> None:
     print(table(note), end="")
 
 
-def settings(run: Path) -> dict[str, Any]:
-    """The settings of the run in that folder; those of LbW where none are noted."""
-    note = run / "settings.json"
-    return json.loads(note.read_text(encoding="utf-8")) if note.exists() else {"method": "lbw"}
-
-
 def method_of(run: Path) -> str:
     """The name of the method whose run is in that folder. Raises InputError for LbW's own."""
-    method = settings(run)["method"]
+    method = settings_of(run)["method"]
     names = {rival: name for rival, (name, _) in METHODS.items()}
     if method not in names:
         raise InputError(f"--beside {run}: no run of a rival is there.")

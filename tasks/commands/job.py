@@ -195,10 +195,14 @@ def check_task(run: Path, name: str) -> None:
 
     A policy by object tracks does not tell by itself: what it sees is as long in every task.
     """
-    note = run / "settings.json"
-    there = json.loads(note.read_text(encoding="utf-8")) if note.exists() else {}
-    if (task := there.get("task", name)) != name:
+    if (task := settings_of(run).get("task", name)) != name:
         raise InputError(f"{run}: a run of the task {task}, not of {name}; give one of {name}.")
+
+
+def settings_of(run: Path) -> dict[str, Any]:
+    """The settings of the run in that folder; those of LbW where none are noted."""
+    note = run / "settings.json"
+    return json.loads(note.read_text(encoding="utf-8")) if note.exists() else {"method": "lbw"}
 
 
 def refuse_idle_options(args: argparse.Namespace, from_scratch: bool) -> None:
