@@ -22,7 +22,7 @@ from gymnasium.wrappers import TimeLimit
 
 from lbw_minimal import munit, sac, transporter
 from lbw_minimal.reward import KeypointReward, LiteralReward, MendedReward
-from lbw_minimal.training import Checkpoint, InputError, write_atomic
+from lbw_minimal.training import Checkpoint, InputError, read_json, write_atomic
 from lbw_minimal.wrappers import KeypointObservation, KeypointRewardWrapper
 
 # Frames of random robot motion that show its pace. So few take seconds to film anew, and a trained
@@ -84,9 +84,7 @@ class Run:
     def __init__(self, out: Path):
         self.out = Path(out)
         path = self.out / "metrics.json"
-        self.metrics = (
-            json.loads(path.read_text(encoding="utf-8")) if path.exists() else {"stages": {}}
-        )
+        self.metrics = read_json(path) if path.exists() else {"stages": {}}
 
     def save(self) -> None:
         """Write metrics.json."""

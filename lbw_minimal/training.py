@@ -71,6 +71,16 @@ def write_atomic(path: Path | str, data: bytes | str) -> None:
     os.replace(part, path)
 
 
+def read_json(path: Path | str) -> Any:
+    """What a JSON file of a run holds. Raises InputError if it is torn or no JSON."""
+    try:
+        return json.loads(Path(path).read_text(encoding="utf-8"))
+    except ValueError:  # bytes that are no text are one as well
+        raise InputError(
+            f"{path}: this is no JSON, or half of it; restore it, or give another folder."
+        ) from None
+
+
 def _flatten(state, name, tensors):
     if isinstance(state, dict):
         # Optimizers key their state by integers, and JSON's keys are strings: pairs keep the type.

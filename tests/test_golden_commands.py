@@ -51,7 +51,7 @@ def test_a_probe_finds_what_it_found(monkeypatch, golden):
     monkeypatch.setattr(probe, "record_random", record)
     monkeypatch.setattr(probe, "record_expert", lambda env, seed: (asked.append(seed) or way, 0))
     monkeypatch.setattr(probe.tasks, "bare", lambda name, embodiment: SimpleNamespace(
-        arm=embodiment, CONTACT=0.04))  # fmt: skip
+        arm=embodiment, CONTACT=0.04, close=list))  # fmt: skip
     found, figures = probe.probe("push", Seer(way + (0, 0, 3, 0)), 11, 120), {}
     for where in probe.SETS:
         for name, row in found[where].items():

@@ -11,7 +11,7 @@ from digests import options
 
 import tasks
 from lbw_minimal import sac
-from lbw_minimal.imitate import Recipe
+from lbw_minimal.imitate import Recipe, Run
 from lbw_minimal.training import InputError
 from tasks.commands import job
 from tasks.commands.job import prepare_folder, videos
@@ -66,6 +66,20 @@ def test_a_run_is_gone_on_with_by_its_own_settings_alone(tmp_path):
     assert (tmp_path / "policy.checkpoint").read_text() == "half of it"
     with pytest.raises(InputError, match="that run had other settings"):
         prepare_folder(tmp_path, {"seed": 1}, resume=True)
+
+
+@pytest.mark.parametrize("bad", ['{"fast": tr', "", b"\xff\xfe{"])
+def test_settings_that_are_no_json_are_named_and_a_new_run_replaces_them(tmp_path, bad):
+    note = tmp_path / "settings.json"
+    note.write_bytes(bad if isinstance(bad, bytes) else bad.encode())
+    (tmp_path / "policy_log.json").write_text("[]")
+    for ask in (job.settings_of, Run, lambda out: prepare_folder(out, {"fast": True}, False),
+                lambda out: prepare_folder(out, {"fast": True}, True)):  # fmt: skip
+        (tmp_path / "metrics.json").write_bytes(note.read_bytes())
+        with pytest.raises(InputError, match=r"(settings|metrics)\.json: this is no JSON, or half"):
+            ask(tmp_path)
+    prepare_folder(tmp_path, {"fast": False}, resume=False)
+    assert job.settings_of(tmp_path) == {"fast": False}
 
 
 @pytest.mark.parametrize(

@@ -42,7 +42,10 @@ def found(monkeypatch):
         return filmed(env, frames, seed)
 
     def bare(name, embodiment):
-        return SimpleNamespace(embodiment=embodiment, CONTACT=0.04)
+        def close():
+            asked.append(f"{embodiment} closed")
+
+        return SimpleNamespace(embodiment=embodiment, CONTACT=0.04, close=close)
 
     expert = np.full((20, 4), 40.0)
     expert[:, 2] = 46 + np.arange(20)  # the object goes, 6 pixels and more before the tip
@@ -57,7 +60,7 @@ def found(monkeypatch):
 
 def test_what_is_exact_has_r2_of_1_and_a_shift_costs_its_pixels_only_where_maps_are_lent(found):
     scores, asked = found
-    assert asked == [("robot", 160, 7), ("human", 80, 8)]
+    assert asked == [("robot", 160, 7), ("human", 80, 8), "robot closed", "human closed"]
     for where in ("robot", "translated"):
         for name in ("tip_x", "tip_y", "object_x"):
             assert scores[where][name] == {"r2": 1.0, "px": 0.0}

@@ -6,7 +6,6 @@ not repeated, what was interrupted goes on.
 
 from __future__ import annotations
 
-import json
 import shlex
 import subprocess
 import sys
@@ -16,7 +15,7 @@ from typing import Any
 
 from lbw_minimal import cluster
 from lbw_minimal.reward import MENDS
-from lbw_minimal.training import InputError, write_atomic
+from lbw_minimal.training import InputError, read_json, write_atomic
 from tasks.commands import make_folder
 
 # Arguments of a run by its change; "" is the recipe. These train all of their networks ...
@@ -55,10 +54,7 @@ def folder(out: Path, task: str, seed: int, change: str = "") -> Path:
 def finished(path: Path, episodes: int) -> bool:
     """Whether a run has ended with that many test episodes."""
     note = path / "metrics.json"
-    return (
-        note.exists()
-        and len(json.loads(note.read_text(encoding="utf-8")).get("episodes", ())) == episodes
-    )
+    return note.exists() and len(read_json(note).get("episodes", ())) == episodes
 
 
 def rests_on(change: str) -> str:
@@ -180,9 +176,7 @@ def run_on_cluster(out: Path, jobs: list[Job], episodes: int) -> None:
 
 def read(out: Path, task: str, seed: int, change: str = "") -> Row:
     """One finished run as a row: its wins, seconds a stage, steps, and R^2 of perception."""
-    metrics = json.loads(
-        (folder(out, task, seed, change) / "metrics.json").read_text(encoding="utf-8")
-    )
+    metrics = read_json(folder(out, task, seed, change) / "metrics.json")
     return {
         "task": task,
         "seed": seed,

@@ -23,7 +23,7 @@ from lbw_minimal import video
 from lbw_minimal.clips import detector
 from lbw_minimal.clips.detector import SURE, Detector, Found
 from lbw_minimal.clips.drawings import SIZE, draw_clip
-from lbw_minimal.training import Checkpoint, InputError, pick_device, write_atomic
+from lbw_minimal.training import Checkpoint, InputError, pick_device, read_json, write_atomic
 from tasks.commands import Parser, at_least, make_folder
 from tasks.world import load_recordings
 
@@ -64,9 +64,7 @@ def main(argv: list[str]) -> None:
     weights, metrics_file = args.out / "eyes.safetensors", args.out / "metrics.json"
     if args.measure:
         model = Detector.load(weights)
-        metrics = (
-            json.loads(metrics_file.read_text(encoding="utf-8")) if metrics_file.exists() else {}
-        )
+        metrics = read_json(metrics_file) if metrics_file.exists() else {}
     else:
         pick_device(args.device)  # or it is known only after minutes that there is none
         make_folder(args.out)
@@ -114,7 +112,7 @@ def measure(model: Detector, clips: Path | None = None) -> dict[str, dict]:
     for task in tasks.TASKS:
         out[f"{task}'s videos"] = compare(filmed(model, task))
     if clips:
-        for name, told in json.loads(MARKS.read_text(encoding="utf-8"))["clips"].items():
+        for name, told in read_json(MARKS)["clips"].items():
             out[name] = compare([marked(model, clips / name, told)])
     return out
 

@@ -20,7 +20,7 @@ import tasks
 from lbw_minimal import __version__, classifier, cyclegan, sac, sac_ae, tracks, video
 from lbw_minimal.imitate import Perception, Recipe, Run, load_perception
 from lbw_minimal.reward import MENDS
-from lbw_minimal.training import InputError, pick_device, write_atomic
+from lbw_minimal.training import InputError, pick_device, read_json, write_atomic
 from tasks.commands import JITTER, Parser, at_least, make_folder, metres
 from tasks.commands.links import FILM, NOTE, folder
 from tasks.commands.own_clip import bring
@@ -202,7 +202,7 @@ def check_task(run: Path, name: str) -> None:
 def settings_of(run: Path) -> dict[str, Any]:
     """The settings of the run in that folder; those of LbW where none are noted."""
     note = run / "settings.json"
-    return json.loads(note.read_text(encoding="utf-8")) if note.exists() else {"method": "lbw"}
+    return read_json(note) if note.exists() else {"method": "lbw"}
 
 
 def refuse_idle_options(args: argparse.Namespace, from_scratch: bool) -> None:
@@ -261,17 +261,17 @@ def prepare_folder(out: Path, settings: dict[str, Any], resume: bool) -> Path:
     if resume:
         if not note.exists():
             raise InputError(f"{out}: there is no run to resume here; start it without --resume.")
-        if json.loads(note.read_text(encoding="utf-8")) != settings:
+        if settings_of(out) != settings:
             raise InputError(f"{out}: that run had other settings; give those, or another --out.")
         return out
     make_folder(out)
-    fast = note.exists() and json.loads(note.read_text(encoding="utf-8")).get("fast")
-    if settings.get("fast") and not fast and (out / "policy_log.json").exists():
+    trained = (out / "policy_log.json").exists()
+    if settings.get("fast") and trained and not settings_of(out).get("fast"):
         raise InputError(
             f"{out}: a smoke run would replace the whole run that is there; give another --out."
         )
     try:
-        if note.exists() and note.read_text(encoding="utf-8") != json.dumps(settings):
+        if note.exists() and note.read_bytes() != json.dumps(settings).encode():
             print(f"note: {out}: an earlier run with other settings is replaced.", file=sys.stderr)
         for pattern in RESULTS if note.exists() else ():  # an older run makes room
             for file in out.glob(pattern):

@@ -6,13 +6,12 @@ beside it.
 
 from __future__ import annotations
 
-import json
 import re
 import shlex
 import shutil
 from pathlib import Path
 
-from lbw_minimal.training import write_atomic
+from lbw_minimal.training import read_json, write_atomic
 from tasks.commands.links import FILM, NOTE, links, note_of
 from tasks.commands.prepare import PAGE, STILLS, Prepared, write
 
@@ -34,7 +33,7 @@ def bring(out: Path, name: str, clip: Prepared, file: Path) -> dict[str, str]:
             shutil.copy(note, out)
         text, here = page.read_text(encoding="utf-8"), links(out / PAGE)
         write_atomic(out / PAGE, NAV.sub(lambda _: here, text, count=1))
-        return json.loads(note.read_text(encoding="utf-8"))
+        return read_json(note)
     command = shlex.join(["python", "-m", "tasks", "prepare", name, str(file)])
     said = note_of(file, name, command)
     write(out, name, clip, said)

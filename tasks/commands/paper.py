@@ -21,7 +21,7 @@ import tasks
 from lbw_minimal import diagram, video
 from lbw_minimal.pictures import data_uri
 from lbw_minimal.report_texts import CSS, HTML, options
-from lbw_minimal.training import write_atomic
+from lbw_minimal.training import read_json, write_atomic
 from tasks.commands import Parser, at_least, controls, figures, make_folder, translations
 from tasks.commands.batch import Job, folder, read, run_missing
 from tasks.commands.job import TEST_EPISODES
@@ -241,9 +241,7 @@ def over_steps(plan: Plan) -> str:
     for task in tasks.TASKS:
         for change in ("", *RIVALS):
             paths = [folder(plan.runs, task, s, change) for s in plan.seeds_of(change)]
-            logs[task][METHODS[change][0]] = [
-                json.loads((path / "policy_log.json").read_text(encoding="utf-8")) for path in paths
-            ]
+            logs[task][METHODS[change][0]] = [read_json(path / "policy_log.json") for path in paths]
     return shown(plan, "steps", figures.over_steps(logs), "Success over environment steps")
 
 
@@ -260,7 +258,7 @@ def measured(plan: Plan, change: str, jitters: Sequence[float]) -> list[dict]:
             run = folder(plan.runs, task, 0, change)
             note = controls.measure(task, run, plan.controls, 0, rivals, jitters, plan.fast)
             write_atomic(path, json.dumps(note, indent=1) + "\n")
-        return json.loads(path.read_text(encoding="utf-8"))
+        return read_json(path)
 
     return [note_of(task) for task in tasks.TASKS]
 
@@ -302,7 +300,7 @@ def perception(plan: Plan) -> str:
         write_atomic(path, json.dumps(found, indent=1) + "\n")
     rows = [
         [f"{name}, {where}", *("-" if s["r2"] is None else f"{s['r2']:.3f}" for s in cells)]
-        for name, found in json.loads(path.read_text(encoding="utf-8")).items()
+        for name, found in read_json(path).items()
         for where in ("translated", "transfer")
         for cells in [[found[where][n] for n in NAMES]]
     ]

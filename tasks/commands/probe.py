@@ -87,6 +87,8 @@ def probe(name: str, perception: Perception, seed: int, frames: int = 400) -> di
             "demonstration": gap(pixels(perception.z_E)),
             "robot": gap(pixels(expert)),
         }
+    robot.close()
+    human.close()
     out["keypoint_std"] = np.round(z.reshape(len(z), -1).std(0), 3).tolist()
     return out
 

@@ -6,7 +6,6 @@ In: the human video of the task, or the user's. Out: a folder with weights, logs
 
 from __future__ import annotations
 
-import json
 import shutil
 import time
 from itertools import islice
@@ -24,7 +23,7 @@ from lbw_minimal.clips.stills import read_stills
 from lbw_minimal.follow import follow
 from lbw_minimal.imitate import PACE, Perception, imitate, learn_perception
 from lbw_minimal.report import wilson, write_report
-from lbw_minimal.training import InputError, counted, peak_memory
+from lbw_minimal.training import InputError, counted, peak_memory, read_json
 from tasks.commands.job import TEST_EPISODES, Job, check, parser
 from tasks.commands.links import links
 from tasks.commands.prepare import STILLS
@@ -216,9 +215,7 @@ def report(job: Job, seen: dict[str, Any], first: dict[str, Any], scene: str) ->
         **seen,
         clip=read_stills(out / STILLS),
         goal=tasks.goal(job.name),
-        log=json.loads(log.read_text(encoding="utf-8"))
-        if log.exists()
-        else [],  # a replayed policy has none
+        log=read_json(log) if log.exists() else [],  # a replayed policy has none
         episode=first,
         metrics=metrics,
         scene_html=scene,

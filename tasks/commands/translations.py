@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -18,6 +17,7 @@ from lbw_minimal.imitate import Perception
 from lbw_minimal.pictures import draw_keypoints, enlarge
 from tasks.commands import figures
 from tasks.commands.batch import folder
+from tasks.commands.job import settings_of
 from tasks.commands.probe import PROBE_SEED, probe
 
 
@@ -52,9 +52,7 @@ class Cycled:
         demo = demo_of("push")
         if not path.exists():
             random = video.read(tasks.VIDEOS / "push" / "random.mp4", whole=True)[0]
-            recipe = json.loads(
-                (folder(runs, "push", 0) / "settings.json").read_text(encoding="utf-8")
-            )["recipe"]
+            recipe = settings_of(folder(runs, "push", 0))["recipe"]
             robot = tasks.pace_film("push", 0, recipe["robot_frames"])
             v = [cyclegan.translate(model, frames) for frames in (demo, random)]
             detector, _ = transporter.train(
