@@ -279,8 +279,8 @@ def book(only: list[str]) -> int:
     BOOK.mkdir(parents=True, exist_ok=True)
     write_atomic(BOOK / "index.html", contents())
     write_atomic(BOOK / "glossary.html", glossary())
-    for source in asked:
-        print(source.stem, flush=True)
+    for i, source in enumerate(asked, 1):
+        print(f"{source.stem}, {i} of {len(asked)}", flush=True)
         try:
             notebook = execute(source)
         except CellExecutionError as e:
