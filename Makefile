@@ -25,7 +25,6 @@ test: $(VENV)/ready
 	@echo "The tests take 5 to 10 minutes on two cores."
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/mypy
 	$(BIN)/python -m pytest -q -rs -n auto --dist loadfile --no-loadscope-reorder \
 	    -m "not slow and not peers"
 
