@@ -76,6 +76,7 @@ def test_resampling_takes_the_nearest_frame_and_invents_none():
     assert resample(np.array([0, 0.1, 0.2])).tolist() == [0, 0, 1, 1, 2, 2]
     assert resample(np.array([0.0, 0.3]), rate=10).tolist() == [0, 0, 1, 1]
     assert resample(np.arange(7) / 50).tolist() == [0, 2, 4, 6]
+    assert resample(np.array([0, 0.08, 0.16])).tolist() == [0, 0, 1, 1, 2]  # halfway: the earlier
 
 
 def test_slow_motion_that_says_so_is_played_at_true_speed(tmp_path):
@@ -456,11 +457,11 @@ def test_of_frames_at_one_moment_the_first_is_kept(monkeypatch):
 
 
 def test_the_longest_piece_is_that_of_most_seconds_and_begins_at_0():
-    """Three frames in 2 s outlast five in 0.4."""
-    frames = np.arange(11, dtype=np.uint8)
-    times = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 5.0, 6.0, 7.0, 8.0, 8.1, 8.2])
-    piece = steady(clips.Clip(frames, times, [5, 8], ["a note"], ["a loss"]))
-    assert piece.frames.tolist() == [5, 6, 7] and piece.times.tolist() == [0, 1, 2]
+    """Two frames in 2 s outlast five in 0.4."""
+    frames = np.arange(10, dtype=np.uint8)
+    times = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 5.0, 7.0, 8.0, 8.1, 8.2])
+    piece = steady(clips.Clip(frames, times, [5, 7], ["a note"], ["a loss"]))
+    assert piece.frames.tolist() == [5, 6] and piece.times.tolist() == [0, 2]
     assert (piece.cuts, piece.notes, piece.losses) == ([], ["a note"], ["a loss"])
 
 

@@ -285,6 +285,9 @@ def test_the_outermost_boxes_of_an_mp4_are_found_by_their_sizes(tmp_path):
     assert decoding._boxes(path) == {b"ftyp", b"mdat", b"moov"}
     path.write_bytes(small + small[:4] + b"?" * 12)
     assert decoding._boxes(path) == {b"ftyp"}
+    many = [str(1000 + i).encode() for i in range(100)]  # a film has ten: this is none
+    path.write_bytes(b"".join((8).to_bytes(4, "big") + name for name in many))
+    assert decoding._boxes(path) == set(many[:64])
 
 
 def test_why_a_film_does_not_open_is_told_from_its_boxes(tmp_path):
