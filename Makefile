@@ -55,6 +55,7 @@ notebooks: $(VENV)/ready
 	$(BIN)/python -m solutions release
 
 book: $(VENV)/ready
+	@echo "All fourteen take 15 to 25 minutes on two cores."
 	$(BIN)/python -m solutions book
 
 # Frames and states under both builds of PyBullet: .venv has one, this folder the other.
