@@ -15,7 +15,7 @@ from tests.grade.__main__ import grade, grade_one
 from tests.grade.cell.answer import PREAMBLE
 from tests.grade.cell.wire import Other, Raised, decode, encode
 from tests.grade.conftest import _exercise, pytest_collection_modifyitems, pytest_configure
-from tests.grade.exercise import everything, find
+from tests.grade.exercise import Check, everything, find
 from tests.grade.files import File
 from tests.grade.judge import TRY, judge
 from tests.grade.submission import RELEASED, Answer
@@ -189,6 +189,14 @@ def test_smaller_inputs_than_those_that_were_asked_are_tried_first():
     check = find("0.1").checks[1]
     sizes = [example.size(args) for _, args in example.candidates([(check, (np.zeros(40), 0.5))])]
     assert sizes[0] < sizes[-1] == 41 and sizes == sorted(sizes)
+
+
+def test_how_large_the_inputs_are_that_are_drawn_is_worked_out_once():
+    rngs = []
+    check = Check("", lambda rng: rngs.append(rng) or (np.zeros(3),), 1, 0.0, 0.0, 1, None)
+    both = [example.candidates([(check, (np.zeros(40),))]) for _ in range(2)]
+    assert len(rngs) == example.DRAWS + 2 * example.TRIES
+    assert [[example.size(args) for _, args in one] for one in both] == [[3] * 6 + [40] * 2] * 2
 
 
 def test_what_a_check_asks_by_several_calls_is_not_shown_by_one():

@@ -37,15 +37,22 @@ def candidates(wrong: list[tuple[Check, tuple]]) -> list[tuple[Check, tuple]]:
     """(check, inputs) to try, the smallest first: some that are drawn anew and are smaller than all
     that an answer has failed at, then some of those; each with few digits, and as it is."""
     least = min((size(args) for _, args in wrong), default=0)
-    drawn = [
-        (check, args)
-        for check in dict.fromkeys(check for check, _ in wrong)
-        for i in range(DRAWS)
-        if size(args := ((not i and check.least) or check.inputs)(np.random.default_rng(i))) < least
-    ]
-    drawn.sort(key=lambda pair: size(pair[1]))
+    checks = dict.fromkeys(check for check, _ in wrong)
+    small = [(n, c, i) for c in checks for i, n in enumerate(_sizes(c)) if n < least]
+    small.sort(key=lambda one: one[0])
+    drawn = [(check, _draw(check, i)) for _, check, i in small[:TRIES]]
     known = sorted(wrong, key=lambda pair: size(pair[1]))
-    return [(c, a) for c, args in drawn[:TRIES] + known[:TRIES] for a in (rounded(args), args)]
+    return [(c, a) for c, args in drawn + known[:TRIES] for a in (rounded(args), args)]
+
+
+def _draw(check, i):
+    return ((not i and check.least) or check.inputs)(np.random.default_rng(i))
+
+
+@functools.cache
+def _sizes(check) -> list[int]:
+    """How large the inputs are that are drawn: they hang on the check alone, not on the answer."""
+    return [size(_draw(check, i)) for i in range(DRAWS)]
 
 
 def rounded(value):
