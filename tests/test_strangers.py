@@ -98,11 +98,13 @@ def test_the_truth_is_in_the_pixels_of_the_clip_as_it_is_read(task, tmp_path):
 
 # Filmed kinds are what they say.
 
+SEEN = "no arm", "hidden", "two people"  # kinds of which a test counts pixels
+
 
 @functools.cache
 def told(kind, task="push", seed=0):
-    """A story's moments, where its arms' tips got to (n, arms, 3) m, and how many pixels of the
-    thing and of each arm the kit's camera sees then, (n, 1 + arms)."""
+    """A story's moments, where its arms' tips got to (n, arms, 3) m, and, of what is SEEN, how many
+    pixels of the thing and of each arm the kit's camera sees then, (n, 1 + arms)."""
     rng = np.random.default_rng(seed)
     env = tasks.bare(task, embodiment="human", observation="state")
     env.reset(seed=0)
@@ -116,6 +118,8 @@ def told(kind, task="push", seed=0):
     bodies = [getattr(env, thing) if thing else -1, *(arm.body for arm in arms)]
     for _ in staged(env, moments, arms, None):
         tips.append([arm.tip_pose()[0] for arm in arms])
+        if kind not in SEEN:
+            continue
         seen = p.getCameraImage(84, 84, env.world.view, env.world.projection,
                                 renderer=p.ER_TINY_RENDERER)[4]  # fmt: skip
         pixels.append([(np.asarray(seen) == body).sum() for body in bodies])
