@@ -1,5 +1,7 @@
 """What has left its place, by squares before a wall of 160x120 pixels, which no frame shrinks."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -212,9 +214,22 @@ def test_an_object_that_stays_where_a_thing_has_left_is_that_thing_however_it_we
     stays = found(np.full(N, 67.0))
     told = followed(lifted, stays)
     assert np.ptp(told.object, axis=0).max() > 40 and told.tip is stays.tip
-    beside = found(np.full(N, 72.0))  # five pixels beside it
-    assert followed(lifted, beside) is beside
     leaves = found(67.0 + np.linspace(0, 8, N))  # by more than 0.06 of 120 pixels
     assert followed(lifted, leaves) is leaves
     hidden = film(hides=lambda t: t >= COMES)
     assert followed(hidden, stays) is stays
+
+
+def test_an_object_that_stays_elsewhere_is_not_what_the_hand_takes():
+    swings = 20 * np.sin(np.maximum(0, np.arange(N) - LEAVES))
+    lifted = film((WAY + swings).astype(int))
+    stays = found(np.full(N, 100.0), 20)
+    told = followed(lifted, stays)
+    assert np.ptp(told.object, axis=0).max() > 40 and abs(told.object[0, 0] - 67) < 2
+    leaves = found(100.0 + np.linspace(0, 8, N), 20)
+    assert followed(lifted, leaves) is leaves
+    far = replace(stays, tip=stays.tip - (8, 0))  # 20 pixels from the thing as that leaves
+    assert followed(lifted, far) is far
+    along = np.interp(np.arange(N), [LEAVES, N - 1], [62, 160])
+    goes = replace(stays, tip=np.stack([along, np.full(N, 77)], 1))
+    assert followed(lifted, goes) is goes  # as soon as the hand: it is a piece of that

@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 
 from lbw_minimal.clips.detector import Found
-from lbw_minimal.clips.patches import ALIKE, CHANGED, Path, looked_at, shrunk, tip_at
+from lbw_minimal.clips.patches import ALIKE, ALONE, CHANGED, Path, looked_at, shrunk, tip_at
 from lbw_minimal.clips.paths import LEAST_WAY, SURE, Unusable, extent
 
 ENDS = 16  # a shot's first and last frames are so many of it
@@ -157,7 +157,9 @@ def check_seen(thing: Vanished | None, tip: np.ndarray, sure: np.ndarray) -> Non
 def followed(thing: Vanished | None, frames: np.ndarray, found: Found) -> Found:
     """Found in the frames (T, H, W, 3) uint8 of one shot, with the way of the thing that has left
     its place as the object's where that is another one, and that of a thing that is pushed; or
-    where the object stays there: then it was seen as it stood, and not as it left."""
+    where the object stays there: then it was seen as it stood, and not as it left; or where the
+    object stays elsewhere, and the hand was at the thing as it left: who takes one thing moves no
+    other."""
     alike = np.median(thing.alike[thing.left :]) if thing else 0
     if thing is None or alike < ALIKE:
         return found
@@ -167,7 +169,9 @@ def followed(thing: Vanished | None, frames: np.ndarray, found: Found) -> Found:
     sure = found.object_sure[k] >= SURE
     near = np.linalg.norm(found.object[k] * scale - thing.places, axis=1) < AGREES[0]
     goes = alike >= FOLLOWED and path.pushed and (near & sure).mean() < AGREES[1]
-    stays = near[0] and extent(found.object[k][sure]) < LEAST_WAY * min(frames.shape[1:3])
+    taken = path.alone >= ALONE and _at(path.tip, thing)  # a piece of the hand does not wait
+    still = extent(found.object[k][sure]) < LEAST_WAY * min(frames.shape[1:3])
+    stays = still and (near[0] or taken)
     if not goes and not stays:
         return found
     along = np.arange(n)
@@ -177,3 +181,10 @@ def followed(thing: Vanished | None, frames: np.ndarray, found: Found) -> Found:
         object=np.stack(places, 1),
         object_sure=np.interp(along, k, np.clip(1 + (thing.alike - 1) / 0.8, 0, 1)),
     )
+
+
+def _at(tip, thing):
+    """Whether the tip (n, 2) is known, and is at a thing in the last frame in which that stands."""
+    if tip is None:
+        return False
+    return np.linalg.norm(tip[max(0, thing.left - 1)] - thing.places[0]) < BESIDE
