@@ -210,7 +210,7 @@ def class_of_cheats(tmp_path_factory):
     for name, (source, _) in BAD.items():
         write(folder, name, answered(source.replace("CLASS", repr(str(folder)))))
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sandbox, "WALL", 10)
+        patch.setattr(sandbox, "WALL", 4)
         patch.setattr(sandbox, "CPU", 2)
         assert main([str(folder), "--out", str(out), "--notebooks", "6"]) == 0
     return grades(out)

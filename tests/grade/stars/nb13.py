@@ -1,5 +1,7 @@
 """Star 13, behind a curtain: how far off is a track once the object has been hidden?"""
 
+import functools
+
 import numpy as np
 
 import tasks
@@ -20,6 +22,7 @@ def error(locate) -> float:
     return float(np.mean(off))
 
 
+@functools.cache
 def hidden(task: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """A human's film with a curtain before it when the object has gone a third of its way.
 
