@@ -60,6 +60,34 @@ def test_an_arm_is_large_sure_and_reaches_in_over_an_edge(piece, seen):
     assert told(piece).seen == seen
 
 
+BELOW = 20, 20, 4, 12, 0.9
+
+
+@pytest.mark.parametrize(
+    ("piece", "below"),
+    [
+        (BELOW, 1), ((20, 17, 4, 12, 0.9), 1), ((20, 16, 4, 12, 0.9), 0),  # so far from the edge
+        ((4, 20, 4, 12, 0.9), 1), ((3, 20, 4, 12, 0.9), 0),  # over the left edge as well
+        ((20, 26, 10, 6, 0.9), 1), ((20, 27, 10, 5, 0.9), 0),  # half as far in as wide
+        ((20, 27, 4, 5, 0.9), 1), ((20, 31, 19, 1, 0.9), 0),  # 20 cells; 19
+    ],
+)  # fmt: skip
+def test_an_arm_from_below_comes_in_over_no_other_edge(piece, below):
+    found = told(piece)
+    assert found.below == below and ("lower edge" in (found.doubt or [""])[0]) == (below == 1)
+
+
+@pytest.mark.parametrize(("frames", "said"), [(9, "no arm"), (10, "the arm comes in over the low")])
+def test_an_arm_from_below_is_seen_in_a_tenth_of_the_frames(frames, said):
+    assert count(*[mask(BELOW)] * frames, *[mask()] * (100 - frames)).doubt[0].startswith(said)
+
+
+@pytest.mark.parametrize(("frames", "below"), [(9, True), (10, False)])
+def test_an_arm_that_is_seen_from_elsewhere_counts_before_one_from_below(frames, below):
+    doubt = count(*[mask(ARM)] * frames, *[mask(BELOW)] * (100 - frames)).doubt
+    assert doubt is None if not below else "lower edge" in doubt[0]
+
+
 def test_an_arm_may_be_seen_in_pieces_if_it_is_large_once():
     small = mask((20, 0, 3, 4, 0.9))
     assert count(*[small] * 4).seen == 0

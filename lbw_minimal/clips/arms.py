@@ -38,22 +38,32 @@ OFTEN = 0.05  # of the frames: an arm at its median place is not told from the r
 
 
 class Arms(NamedTuple):
-    """What arms come in over the left, the right and the upper edge of a shot."""
+    """What arms come in over the left, the right and the upper edge of a shot, and over no other
+    than the lower one."""
 
     seen: float  # share of the frames in which the masks show one or more
     several: float  # share of the frames in which they show two beside each other
     enters: float  # where the largest comes in, 0 at the picture's left edge, 1 at its right; nan
     moves: bool  # whether something as large as an arm moves over an edge
     across: float  # share of the frames in which large things are at both side edges
+    below: float = 0.0  # share of the frames in which one comes in over the lower edge alone
 
     @property
     def doubt(self) -> tuple[str, str] | None:
-        """Why the shot may show no arm, or several people, and what to film otherwise."""
+        """Why the shot may show no arm, one from the camera's side, or several people, and what to
+        film otherwise."""
+        if self.seen < SEEN <= self.below:  # what one wears or holds and films with sees it so
+            return (
+                "the arm comes in over the lower edge, as from the camera, and so hides what it is "
+                "to push",
+                SIDE_ON,
+            )
         if self.seen < SEEN and not self.moves:
             return "no arm is seen, nothing large that moves comes in from the edge", SIDE_ON
         if self.several >= SEVERAL or self.across >= OFTEN:
             return (
-                "arms come in at two places, as of several people, or of one who fills the picture",
+                "arms, or other large things, come in at two places, as of several people, or of "
+                "one who fills the picture",
                 "film one arm, without the body, and let nothing else move near the edges",
             )
         return None
@@ -61,9 +71,8 @@ class Arms(NamedTuple):
 
 def count(masks: np.ndarray, off: np.ndarray) -> Arms:
     """The arms in masks (n, h, w), and in what is `off` the room, (T, 84, 84) grey levels."""
-    found = [_coming_in(mask) for mask in masks]
-    if max((arm[2] for one in found for arm in one), default=0) < MOST:
-        found = []
+    found = _large([_coming_in(mask) for mask in masks])
+    lower = _large([_coming_in(mask, lower=True) for mask in masks])
     several = [any(b[0] - a[1] >= APART for a, b in pairwise(sorted(one))) for one in found]
     places = [max(one, key=lambda arm: arm[2])[3] for one in found if one]
     doors = _doors(off > MOVED)
@@ -75,14 +84,22 @@ def count(masks: np.ndarray, off: np.ndarray) -> Arms:
         enters=float(np.median(places)) if places else np.nan,
         moves=_comes_in(off > FAINT),
         across=float((np.nan_to_num(np.ptp(doors, axis=1)) >= ACROSS).mean()),
+        below=sum(map(bool, lower)) / len(masks),
     )
 
 
-def _coming_in(mask):
-    """First and last column, cells, and place at the edge, 0 to 1, of each arm in a mask (h, w)."""
+def _large(found):
+    """The arms of each frame; none where not one of them all is large."""
+    return found if max((arm[2] for one in found for arm in one), default=0) >= MOST else []
+
+
+def _coming_in(mask, lower=False):
+    """First and last column, cells, and place at the edge, 0 to 1, of each arm in a mask (h, w),
+    that comes in over the left, right or upper edge; lower: over the lower one alone."""
     h, w = mask.shape
     x, y = np.meshgrid(np.arange(w) + 0.5, np.arange(h) + 0.5)
-    inside = np.minimum(np.minimum(x, w - x), y)  # cells from the nearest edge
+    others = np.minimum(np.minimum(x, w - x), y)  # cells from the nearest edge
+    inside = h - y if lower else others
     n, labels, stats, _ = cv2.connectedComponentsWithStats((mask > SURE).astype(np.uint8))
     arms = []
     for i in range(1, n):
@@ -90,6 +107,8 @@ def _coming_in(mask):
         piece = labels == i
         door = piece & (inside < NEAR)
         if cells < LEAST or mask[piece].max() < PLAIN or not door.any():
+            continue
+        if lower and others[piece].min() < NEAR:
             continue
         if inside[piece].max() >= REACHES * door.sum() / NEAR:
             arms.append((left, left + width, cells, float(x[door].mean()) / w))

@@ -17,8 +17,7 @@ SMOOTH = 0.05  # s, sigma of the low-pass; a webcam's frames are 0.1 s apart, a 
 REST = 0.3  # s that are kept of a rest before the hand starts and after the object has arrived
 SURE = 0.5  # a point found with less is as good as not found
 FOUND = 0.5  # share of the frames in which the object has to be found
-# The same of the tip where nothing is touched: all the motion is its own.
-TIP_FOUND = 0.3
+TIP_FOUND = 0.3  # the same of the tip where nothing is touched: all the motion is its own
 FADE = 0.5  # s, for which a correction of what was surely found lasts beyond it
 UNSURE = 0.5  # s, longer than a glitch of the detector
 # s before the touch, until which a hand that is not found may not have come yet. Of 19 usable films
@@ -30,7 +29,7 @@ LEAST_FRAMES = 8  # of a piece: 0.3 s of a phone's, 0.8 s of a slow webcam's
 # that comes to rest over a thing makes it seem to go 0.05.
 STANDS, LEAST_WAY = 0.04, 0.06
 JUMP = 0.04  # of the same, from one frame to the next, where the picture changes at once as well
-SIDE_ON = "film from the side, so that arm and hand come in from the left or right edge, uncovered"
+SIDE_ON = "film from the side, one arm that comes in from the left or right edge, uncovered"
 NEARER = "film the task being done, so near that it goes across a quarter of the picture"
 RESTS = 0.05  # of the fastest speed; what is slower rests
 
@@ -320,8 +319,9 @@ def ends(path: np.ndarray, least: float, what: str) -> tuple[np.ndarray, np.ndar
 
 
 def never_moves(what: str, gone: float) -> Unusable:
-    """The error for a hand or object, `what`, that has gone too few pixels."""
-    return Unusable(f"the {what} never moves, or by {quantity(round(gone), 'pixel')} only", NEARER)
+    """The error for what was found as the hand or object, `what`, and has gone too few pixels."""
+    said = f"what was taken for the {what} never moves, or by {quantity(round(gone), 'pixel')} only"
+    return Unusable(said, f"if its dot on the page is wrong, click it right, and if not, {NEARER}")
 
 
 def progress(path: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:

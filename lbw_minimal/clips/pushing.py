@@ -52,7 +52,7 @@ def check_way(
     if tracks.width and door > PULLS * tracks.width:
         raise Unusable(
             "the object comes towards the arm, which so pulls it",
-            "push it away from the arm, with the hand behind it",
+            "push it away from the arm, with one hand, which is behind it",
         )
     aside = (thing[i : j + 1] - start) @ (np.array([-along[1], along[0]]) / length**2)
     if np.abs(aside).max() > LIFTED:
@@ -67,7 +67,7 @@ def check_way(
     if came or np.median(ahead[i : j + 1]) > AHEAD:
         raise Unusable(
             "the object comes towards the arm, or the hand is in front of it",
-            "push it away from the arm, with the hand behind it",
+            "push it away from the arm, with one hand, which is behind it",
         )
 
 

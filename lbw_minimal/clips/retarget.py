@@ -161,7 +161,7 @@ def fit(start: np.ndarray, end: np.ndarray, scene: Scene, mirror: bool) -> np.nd
     if abs(dy) > (STEEP if touched else STEEP_HAND) * abs(dx):
         raise Unusable(
             f"it goes {abs(dy):.0f} pixels up or down and {abs(dx):.0f} across",
-            "lift nothing, and " * bool(touched and dy < 0)
+            "lift nothing, and " * touched
             + "film from the side, at the height of the table, so that it goes across the picture",
         )
     if sign * dx < 0:
