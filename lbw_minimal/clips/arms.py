@@ -54,8 +54,7 @@ class Arms(NamedTuple):
         film otherwise."""
         if self.seen < SEEN <= self.below:  # what one wears or holds and films with sees it so
             return (
-                "the arm comes in over the lower edge, as from the camera, and so hides what it is "
-                "to push",
+                "the arm comes in over the lower edge, as from the camera, and hides what it is at",
                 SIDE_ON,
             )
         if self.seen < SEEN and not self.moves:
