@@ -22,7 +22,7 @@ install: $(VENV)/ready
 	@echo "Installed. Now type:  . $(BIN)/activate"
 
 test: $(VENV)/ready
-	@echo "The tests take 5 to 10 minutes on two cores."
+	@echo "The tests take 4 to 10 minutes on two cores."
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/python -m pytest -q -rs -n auto --dist loadfile --no-loadscope-reorder \
