@@ -321,7 +321,7 @@ def ends(path: np.ndarray, least: float, what: str) -> tuple[np.ndarray, np.ndar
 def never_moves(what: str, gone: float) -> Unusable:
     """The error for what was found as the hand or object, `what`, and has gone too few pixels."""
     said = f"what was taken for the {what} never moves, or by {quantity(round(gone), 'pixel')} only"
-    return Unusable(said, f"if its dot on the page is wrong, click it right, and if not, {NEARER}")
+    return Unusable(said, NEARER)
 
 
 def progress(path: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
