@@ -141,7 +141,7 @@ def test_what_is_out_of_sight_needs_no_rendering(world, monkeypatch):
     ball = world.sphere(0.03, (0.56, 0, 0.15), (1, 0, 0, 1))
     assert (world.render() != still).any()
     monkeypatch.setattr(world.p, "getCameraImage", None, raising=False)
-    for place in ((3, 0, 0.1), (0.56, 0, 2), (-2, 0, 0.1), (0.56, 0, -2)):
+    for place in ((3, 0, 0.1), (0.56, 0, 2), (-2, 0, 0.1), (0.56, 0, -2), (0.56, -9, 0)):
         world.p.resetBasePositionAndOrientation(ball, place, (0, 0, 0, 1))
         assert world._window() is None
         assert np.array_equal(world.render(), still)

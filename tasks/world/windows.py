@@ -79,6 +79,10 @@ class Shapes:
         corners = np.array([corners for *_, corners in shapes]) @ turns.swapaxes(1, 2)
         rows = sees[[0, 1, 3]]  # right, up and ahead
         seen = (corners + places[:, None]) @ rows[:, :3].T + rows[:, 3]  # (n, 8, 3)
+        ahead = seen[..., 2] > 0
+        seen = seen[ahead.any(axis=1)]  # what is wholly behind the camera is out of sight
+        if not len(seen):
+            return None
         if seen[..., 2].min() <= 0:
             return Window(0, 0, size, size)
         pixels = (seen[..., :2] / seen[..., 2:] * (1, -1) + 1) / 2 * size
