@@ -38,7 +38,7 @@ def test_a_hand_that_goes_most_of_its_way_elsewhere_is_warned_of(used, warned, b
     said = sliver(T, wanders(used, before, 60 - before), 40, 60)
     assert bool(said) == warned
     if warned:
-        assert said[0].startswith("Of the hand's way only 34% is used, from 11.6 to 12.4 s:")
+        assert said[0].startswith("Of the hand's way only 34% is used, from 11.60 to 12.40 s:")
 
 
 def test_a_hand_that_comes_and_goes_back_by_the_same_way_is_not():

@@ -36,6 +36,6 @@ def sliver(t: np.ndarray, tip: np.ndarray, first: int, last: int) -> list[str]:
     if share >= SLIVER:
         return []
     return [
-        f"Of the hand's way only {share:.0%} is used, from {t[first]:.1f} to {t[last]:.1f} s: does "
-        "it come to its mark there, and stop?"
+        f"Of the hand's way only {share:.0%} is used, from {t[first]:.2f} to {t[last]:.2f} s: does "
+        "it come to its mark then, and stop?"
     ]
