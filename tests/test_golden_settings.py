@@ -23,7 +23,7 @@ MODULES = {
         *("light", "vanished", "behind", "lifting", "used"),
     ),
     "tasks": tuple(tasks.TASKS),
-    "tasks.world": ("arm", "bodies", "env", "motion", "reenact", "scene"),
+    "tasks.world": ("arm", "bodies", "env", "motion", "reenact", "scene", "windows"),
     "tasks.commands": (
         *("eyes", "prepare", "run", "recipe", "probe", "ablation", "batch", "controls", "paper"),
         *("robustness", "table", "translations", "stage", "choices"),

@@ -8,10 +8,10 @@ import pytest
 from digests import digest
 
 from tasks.push import Push
-from tasks.world import World, expert_actions, random_actions
+from tasks.world import World, expert_actions, random_actions, viewer
 from tasks.world.bodies import ARMS, human, limb
 from tasks.world.env import Leg, _scatter
-from tasks.world.meshes import Mesh, normals, read_mesh, read_obj
+from tasks.world.meshes import normals, read_mesh, read_obj
 from tasks.world.recording import Recording, load_recordings, save_recordings
 from tasks.world.scene import LOOKS, Part, numbers
 
@@ -319,7 +319,7 @@ def test_normals_are_those_that_were_drawn(golden):
     three = np.array([eave, [-np.cos(b), 0, -np.sin(b)], [0, -1.0, 0]])
     flat = np.zeros((1, 3, 3))
     roof = np.concatenate([[one, two, three], flat])
-    lowered = Mesh(roof[:3]).lower({})
+    lowered = viewer.Mesh(roof[:3]).lower({})
     golden(
         {
             "normals": normals(roof),

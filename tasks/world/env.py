@@ -93,6 +93,7 @@ class TaskEnv(gym.Env, EzPickle):
         self.furnish()
         self.world.paint()
         self.arm = Arm(self.world.p, embodiment, self.WORKSPACE, self.KP, self.OVERSPEED)
+        self.world.shapes.add(self.arm.body, self.arm.spec.meshes)
         self.build()
         self.world.p.stepSimulation()  # a world that never stepped behaves unlike one that did
         self._fresh = self.world.p.saveState()

@@ -4,27 +4,10 @@ from __future__ import annotations
 
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from meshcat import geometry as g
 
 CREASE = np.cos(np.radians(40))  # faces that meet at less than this angle are one round surface
-
-
-class Mesh(g.Geometry):
-    """Triangles (F, 3, 3) in m, drawn with round surfaces round and edges sharp."""
-
-    def __init__(self, corners: np.ndarray):
-        super().__init__()
-        self.corners = corners
-
-    def lower(self, object_data: Any) -> dict[str, Any]:
-        arrays = {"position": self.corners, "normal": normals(self.corners)}
-        attributes = {
-            k: g.pack_numpy_array(a.reshape(-1, 3).T.astype(np.float32)) for k, a in arrays.items()
-        }
-        return {"uuid": self.uuid, "type": "BufferGeometry", "data": {"attributes": attributes}}
 
 
 def normals(corners: np.ndarray) -> np.ndarray:

@@ -29,8 +29,9 @@ from meshcat.animation import Animation, AnimationClip, AnimationTrack
 
 from lbw_minimal.training import write_atomic
 from tasks.world.env import TaskEnv
-from tasks.world.meshes import Mesh, read_mesh, read_obj
+from tasks.world.meshes import normals, read_mesh, read_obj
 from tasks.world.scene import Vector, World
+from tasks.world.windows import link_frame, turn
 
 # m, from the side, like the environments' camera
 EYE, TARGET = (0.5, -1.2, 0.45), (0.42, 0.0, 0.22)
@@ -94,10 +95,25 @@ if (window !== top) {{  // in another page the wheel scrolls that page, until on
 """
 
 
+class Mesh(g.Geometry):
+    """Triangles (F, 3, 3) in m, drawn with round surfaces round and edges sharp."""
+
+    def __init__(self, corners: np.ndarray):
+        super().__init__()
+        self.corners = corners
+
+    def lower(self, object_data: Any) -> dict[str, Any]:
+        arrays = {"position": self.corners, "normal": normals(self.corners)}
+        attributes = {
+            k: g.pack_numpy_array(a.reshape(-1, 3).T.astype(np.float32)) for k, a in arrays.items()
+        }
+        return {"uuid": self.uuid, "type": "BufferGeometry", "data": {"attributes": attributes}}
+
+
 def transform(position: Vector, quaternion: Vector) -> np.ndarray:
     """4x4 matrix of a position in m and a quaternion (x, y, z, w)."""
     T = np.eye(4)
-    T[:3, :3] = np.reshape(p.getMatrixFromQuaternion(quaternion), (3, 3))
+    T[:3, :3] = turn(quaternion)
     T[:3, 3] = position
     return T
 
@@ -169,17 +185,9 @@ class Recorder:
 
     def snap(self) -> None:
         """Append the current pose of every link as one frame of the animation."""
-        self.frames.append(np.array([np.concatenate(self._pose(*link)) for link in self.links]))
-
-    def _pose(self, body, link):
-        """Position and quaternion of a link's URDF frame, in which its visual frames are given."""
-        if link >= 0:
-            return p.getLinkState(
-                body, link, computeForwardKinematics=True, physicsClientId=self.client
-            )[4:6]
-        mass = p.getBasePositionAndOrientation(body, self.client)
-        inertial = p.getDynamicsInfo(body, -1, self.client)[3:5]
-        return p.multiplyTransforms(*mass, *p.invertTransform(*inertial))
+        self.frames.append(
+            np.array([np.concatenate(link_frame(*link, self.client)) for link in self.links])
+        )
 
     def html(self, title: str, fps: float = 25) -> str:
         """A page that needs nothing else: the recorded frames, `fps` a second, over and over.

@@ -1,0 +1,141 @@
+"""Where in the camera's picture bodies can be seen, so that no more of it is rendered.
+
+In: the shapes of bodies, once, and their poses, each frame. Out: the rectangle of the picture
+outside of which none of them is seen. An arm and what it pushes need about half of the picture, and
+a PyBullet that was built without NumPy makes six Python numbers of each pixel that it renders.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+import pybullet
+
+from tasks.world.meshes import read_mesh, read_obj
+
+MARGIN = 1  # pixels: the renderer rounds a corner as it likes
+CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])  # of a box
+
+Pose = tuple[tuple[float, ...], tuple[float, ...]]  # position in m and quaternion (x, y, z, w)
+
+
+class Window(NamedTuple):
+    """A rectangle of a picture, in pixels; `right` and `bottom` are the first ones beyond it."""
+
+    left: int
+    top: int
+    right: int
+    bottom: int
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height."""
+        return self.right - self.left, self.bottom - self.top
+
+    def projection(self, whole: Sequence[float], size: int) -> tuple[float, ...]:
+        """The projection matrix that fills a picture with this window of what `whole` shows on size
+        x size pixels; both (16,), column by column."""
+        matrix = np.reshape(whole, (4, 4)).T.copy()
+        beyond = size - self.left - self.right, self.top + self.bottom - size
+        for row, (pixels, off) in enumerate(zip(self.size, beyond, strict=True)):
+            matrix[row] = (size * matrix[row] + off * matrix[3]) / pixels
+        return tuple(matrix.T.ravel().tolist())
+
+
+class Shapes:
+    """The shapes of a client's bodies, each as the corners (8, 3) in m of a box round it in the
+    frame of its link."""
+
+    def __init__(self, client: int):
+        self.client = client  # PyBullet's number for it
+        self.boxes: dict[int, list[tuple[int, np.ndarray]]] = {}  # by body: link and corners
+
+    def add(self, body: int, meshes: dict[str, str] | None = None) -> None:
+        """Learn a body's shapes. meshes: name and text of the OBJ files that are gone by now.
+
+        Raises ValueError for a shape that is none of `box_round`'s.
+        """
+        shapes = pybullet.getVisualShapeData(body, physicsClientId=self.client)
+        self.boxes[body] = [
+            (link, box_round(kind, size, file.decode(), meshes or {}) @ turn(pose[1]).T + pose[0])
+            for _, link, kind, size, file, *pose in shapes
+        ]
+
+    def window(self, sees: np.ndarray, size: int) -> Window | None:
+        """The part of a picture of size x size pixels in which the bodies can be; None if they are
+        out of sight.
+
+        sees: projection times view matrix, (4, 4). If a body reaches behind the camera, it is all
+        of the picture.
+        """
+        shapes = [(body, *box) for body, boxes in self.boxes.items() for box in boxes]
+        if not shapes:
+            return None
+        poses = [link_frame(body, link, self.client) for body, link, _ in shapes]
+        turns, places = np.array([turn(q) for _, q in poses]), np.array([x for x, _ in poses])
+        corners = np.array([corners for *_, corners in shapes]) @ turns.swapaxes(1, 2)
+        rows = sees[[0, 1, 3]]  # right, up and ahead
+        seen = (corners + places[:, None]) @ rows[:, :3].T + rows[:, 3]  # (n, 8, 3)
+        if seen[..., 2].min() <= 0:
+            return Window(0, 0, size, size)
+        pixels = (seen[..., :2] / seen[..., 2:] * (1, -1) + 1) / 2 * size
+        low = np.clip(np.floor(pixels.min(axis=1)) - MARGIN, 0, size)
+        high = np.clip(np.ceil(pixels.max(axis=1)) + MARGIN, 0, size)
+        inside = (low < high).all(axis=1)
+        if not inside.any():
+            return None
+        ends = np.concatenate([low[inside].min(axis=0), high[inside].max(axis=0)])
+        return Window(*ends.astype(int).tolist())
+
+
+def turn(quaternion: Sequence[float] | np.ndarray) -> np.ndarray:
+    """Rotation matrix (3, 3) of a quaternion (x, y, z, w)."""
+    return np.reshape(pybullet.getMatrixFromQuaternion(quaternion), (3, 3))
+
+
+def link_frame(body: int, link: int, client: int) -> Pose:
+    """The pose of a link's URDF frame, in which its visual frames are given; the base is -1."""
+    if link >= 0:
+        return pybullet.getLinkState(
+            body, link, computeForwardKinematics=True, physicsClientId=client
+        )[4:6]
+    mass = pybullet.getBasePositionAndOrientation(body, client)
+    inertial = pybullet.getDynamicsInfo(body, -1, client)[3:5]
+    return pybullet.multiplyTransforms(*mass, *pybullet.invertTransform(*inertial))
+
+
+def box_round(kind: int, size: Sequence[float], file: str, meshes: dict[str, str]) -> np.ndarray:
+    """Corners (8, 3) in m of the box round a shape of `getVisualShapeData`.
+
+    Raises ValueError for other kinds than boxes, balls, cylinders, capsules and meshes.
+    """
+    if kind == pybullet.GEOM_MESH:
+        name = file.rpartition("/")[2]
+        low, high = _ends_of_text(meshes[name]) if name in meshes else _ends_of_file(file)
+        return ((low + high) / 2 + CORNERS * (high - low) / 2) * size
+    half = {
+        pybullet.GEOM_BOX: np.array(size) / 2,
+        pybullet.GEOM_SPHERE: np.full(3, size[0]),
+        pybullet.GEOM_CYLINDER: np.array([size[1], size[1], size[0] / 2]),
+        pybullet.GEOM_CAPSULE: np.array([size[1], size[1], size[0] / 2 + size[1]]),
+    }.get(kind)
+    if half is None:
+        raise ValueError(f"what a shape of PyBullet's type {kind} covers is not known here.")
+    return CORNERS * half
+
+
+@cache
+def _ends_of_file(file):
+    return _ends(read_mesh(file))
+
+
+@cache
+def _ends_of_text(text):
+    return _ends(read_obj(text))
+
+
+def _ends(triangles):
+    return triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
