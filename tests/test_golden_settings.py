@@ -20,7 +20,7 @@ MODULES = {
         *("detector", "detector_networks", "drawings", "drawn_shapes", "patches", "corners"),
         *("reader", "decoding", "hdr", "upright", "footage", "stills", "lookalike", "camera"),
         *("motion", "outline", "hiding", "paths", "pushing", "retarget", "screen", "shots", "arms"),
-        *("light", "vanished", "behind"),
+        *("light", "vanished", "behind", "lifting", "used"),
     ),
     "tasks": tuple(tasks.TASKS),
     "tasks.world": ("arm", "bodies", "env", "motion", "reenact", "scene", "windows"),

@@ -9,7 +9,12 @@ from lbw_minimal.clips.outline import far_end, reaching
 
 H, W = 168, 252  # two and three pixels for one of the 84 by 84 in which it is looked for
 DEPTHS = np.concatenate([np.zeros(10), np.linspace(10, 160, 30)]).round().astype(int)
-TURNS = {"left": 0, "upper": -1, "right": 2}  # of a picture into which it comes from the left
+TURNS = {
+    "left": 0,
+    "upper": -1,
+    "right": 2,
+    "lower": 1,
+}  # of a picture into which it comes from the left
 
 
 def comes_in(side, depths=DEPTHS, body=0):
@@ -26,11 +31,12 @@ def comes_in(side, depths=DEPTHS, body=0):
 def along_and_across(side, points):
     """Points (T, 2), seen from the edge: how deep in the picture, and where along the edge."""
     x, y = points.T
-    return {"left": (x, y), "right": (W - x, H - y), "upper": (y, H - x)}[side]
+    turned = {"left": (x, y), "right": (W - x, H - y), "upper": (y, H - x), "lower": (W - y, x)}
+    return turned[side]
 
 
 @pytest.mark.parametrize("body", [0, 60], ids=["arm", "body"])
-@pytest.mark.parametrize("side", ["left", "right", "upper"])
+@pytest.mark.parametrize("side", ["left", "right", "upper", "lower"])
 def test_the_tip_is_the_end_that_is_farthest_from_the_edge(side, body):
     tip, seen = far_end(comes_in(side, body=body))
     inside = DEPTHS > 50
@@ -47,11 +53,10 @@ def test_what_reaches_across_all_the_picture_has_no_end_in_it(deep, ends):
 
 
 def test_what_moves_and_does_not_come_in_over_an_edge_is_no_arm():
-    """A thing as large as an arm, which leaves 25 pixels on each side; then it comes to the lower
-    edge, over which none of the scenes' arms comes."""
+    """A thing as large as an arm, which leaves 20 pixels and more on each side."""
     frames = np.repeat(room(H, W)[None], 30, axis=0)
     for t in range(10, 30):
-        frames[t, 60 + 2 * t : 110 + 2 * t, 60 : 120 + 2 * t] = (220, 170, 140)
+        frames[t, 20 + 2 * t : 90 + 2 * t, 60 : 120 + 2 * t] = (220, 170, 140)
     assert not far_end(frames)[1].any()
 
 
@@ -94,7 +99,7 @@ def found_at(sure):
 
 def test_a_hand_that_stirs_at_one_place_does_not_say_that_the_tip_rests_elsewhere():
     stays = found_at(np.ones(40))
-    assert reaching(comes_in("left", np.where(np.arange(40) < 10, 0, 100)), stays) is stays
+    assert reaching(comes_in("left", np.where(np.arange(40) < 10, 0, 100)), stays).tip is stays.tip
     goes = comes_in("left")
     assert reaching(goes, stays) is not stays
 
@@ -120,3 +125,35 @@ def test_a_tip_that_is_found_late_came_by_the_way_of_its_outline():
     off = np.stack([np.zeros(late - came), np.linspace(0, 8, late - came, endpoint=False)], axis=1)
     np.testing.assert_allclose(found.tip[came:late] - tip[came:late], off, atol=1e-9)
     assert np.array_equal(found.tip[late:], path[late:])
+
+
+LIES = np.array([200.0, 40.0])  # where nothing ever is but the room
+
+
+def then_at_the_hand(frames, first):
+    """A tip that is sure in every frame: at a place until the arm is inside, and then its end."""
+    tip, inside = far_end(frames)
+    path = np.where(inside[:, None], tip, first)
+    return Found(path, path, np.ones(len(frames)), np.zeros(len(frames))), inside
+
+
+def test_what_lies_where_nothing_differs_is_no_tip_before_an_arm_is_inside():
+    frames = comes_in("left")
+    found, inside = then_at_the_hand(frames, LIES)
+    assert np.array_equal(reaching(frames, found).tip_sure, inside)
+    assert (reaching(frames[15:], Found(*(v[15:] for v in vars(found).values()))).tip_sure).all()
+
+
+@pytest.mark.parametrize("off", [4, 6])
+def test_a_hand_that_is_seen_before_its_arm_is_large_is_a_tip(off):
+    """A fingertip at one place, so many of 84 pixels beside the tip: in the first frames, and then
+    gone; or not in the first two, and from then on."""
+    frames = comes_in("left")
+    found, inside = then_at_the_hand(frames, LIES)
+    early = np.arange(40) < inside.argmax()
+    x, y = LIES.astype(int) + (3 * off, 0)  # of a picture three times as wide
+    for shown in (np.arange(40) < 10, np.arange(40) > 1):
+        stirs = frames.copy()
+        stirs[shown, y - 2 : y + 2, x : x + 6] = (220, 170, 140)
+        sure = reaching(stirs, found).tip_sure
+        assert (sure[early & shown] == (off <= 4)).all() and sure[inside].all()

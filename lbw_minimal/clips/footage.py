@@ -115,12 +115,6 @@ def _speck(moves):
     return sum(large) >= SOMETIMES
 
 
-def from_outside(stats: np.ndarray) -> np.ndarray:
-    """Which (n,) bool of `things` reach over the left, the right or the upper edge."""
-    x, y, width = stats.T[:3]
-    return (np.minimum(x, y) <= EDGE) | (x + width >= SMALL - EDGE)
-
-
 def things(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Labels (84, 84), from 1 on, of what hangs together in a mask but for gaps of less than 9
     pixels, and its x, y, width, height and area, (n, 5)."""

@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from lbw_minimal.clips.lifting import check_lifted
 from lbw_minimal.clips.paths import (
     FOUND,
     LEAST_WAY,
@@ -34,6 +35,7 @@ from lbw_minimal.clips.paths import (
     unsure,
 )
 from lbw_minimal.clips.pushing import check_apart, check_hand, check_steps, check_way, gets_faster
+from lbw_minimal.clips.used import left_out, sliver
 
 FPS = 25  # steps a second of the motion, as in the tasks
 CONTACT = 0.12  # of the object's way: by then it is pushed, whatever the tip's pixels say
@@ -102,6 +104,7 @@ def lay(tracks: Tracks, scene: Scene, mirror: bool | None = None) -> Motion:
     t = np.arange(tracks.times[0], tracks.times[-1] + 1e-9, 1 / FPS)
     tip = thing = low_pass(*trusted(tracks, "tip"), t)  # (N, 2) pixels
     if touched:
+        check_lifted(tracks)
         s, seen = trusted(tracks, "object")
         thing = low_pass(s, seen, t)
     else:
@@ -139,9 +142,9 @@ def lay(tracks: Tracks, scene: Scene, mirror: bool | None = None) -> Motion:
         x[j:] = x[j]
         _check_reach(x, scene)
     warnings += unsure(whole, "tip", t[0], t[i], t[i if scene.hit else j])
-    warnings += unsure(whole, "object", t[0], t[i], t[j]) if touched else []
     first, last = _first_step(x, i, scene), j + 1 + round(REST * FPS)
-    notes += _left_out(t, first, last)
+    warnings += unsure(whole, "object", t[0], t[i], t[j]) if touched else sliver(t, tip, first, j)
+    notes += left_out(t, first, last)
     notes += _rests(x[first : j + 1])
     part = np.minimum(np.arange(first, last), len(t) - 1)  # a clip that ends sooner stands still
     x, object_ = np.clip(x, scene.low, scene.high)[part], None if object_ is None else object_[part]
@@ -255,19 +258,6 @@ def _first_step(x, i, scene):
     if len(speed) and speed.max() > 0:
         first += max(0, int(np.argmax(speed > RESTS * speed.max())) - round(REST * FPS))
     return max(first, i - round(RUN_UP * FPS)) if scene.hit else first
-
-
-def _left_out(t, first, last):
-    """A sentence for what is left out at the clip's beginning and at its end, if it is long."""
-    head, tail = (first - 1) / FPS, (len(t) - last) / FPS
-    notes = []
-    if head > REST:
-        notes.append(
-            f"The first {head:.1f} s, before the hand moves within the robot's reach, are left out."
-        )
-    if tail > REST:
-        notes.append(f"The last {tail:.1f} s, after the end, are left out.")
-    return notes
 
 
 def _rests(x):
