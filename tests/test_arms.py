@@ -1,5 +1,6 @@
 """How many arms come into a clip, and where: by masks drawn by hand and by the detector's."""
 
+import cv2
 import numpy as np
 import pytest
 from toy_clips import arm, room
@@ -205,6 +206,78 @@ def test_an_arm_comes_in_beside_something_larger_that_does_not():
     assert arms._comes_in(np.stack([moving(arm, toy)] * 2))
     assert not arms._comes_in(np.stack([moving(lamp, toy)] * 2))
     assert not arms._comes_in(np.stack([moving()] * 2))
+
+
+@pytest.mark.parametrize(("rows", "across"), [(2, 0), (3, 1)])
+def test_a_door_at_a_side_edge_is_three_pixels_wide(rows, across):
+    """A hand that reaches to the other edge touches it with less."""
+    off = np.zeros((4, 84, 84))
+    off[:, 30:45, :20] = off[:, 30 : 30 + rows, 60:] = off[:, 30:45, 60:75] = 17
+    assert arms.count(np.zeros((4, H, W), np.float32), off).across == across
+
+
+# An arm that moves beside the one that has the tip
+
+
+FIRST, SECOND, HAND = (4, 0, 4, 12, 0.9), (20, 0, 4, 12, 0.7), (20, 10, 4, 12, 0.9)
+
+
+def beside(*pieces, still=(), tip=(6.0, 11.0), sure=0.5, frames=1):
+    """`arms.beside` for one of so many frames: tip in cells; still: where nothing moves."""
+    shown, moved = mask(*pieces), mask(*pieces) > 0
+    for left, top, width, height, _ in still:
+        moved[top : top + height, left : left + width] = False
+    off = 17.0 * cv2.resize(moved.astype(np.float32), (84, 84), interpolation=cv2.INTER_NEAREST)
+    others = frames - 1
+    return arms.beside(
+        np.stack([shown, *[mask()] * others]),
+        np.stack([off, *[0 * off] * others]),
+        np.array([tip] * frames) / (W, H),
+        np.full(frames, sure),
+    )
+
+
+def test_a_faint_arm_that_moves_beside_one_with_the_tip_is_another():
+    assert beside(FIRST, SECOND) == 1
+    assert beside(FIRST, SECOND, frames=4) == 0.25
+    assert beside(FIRST) == 0
+    assert beside(FIRST, SECOND, still=[SECOND]) == beside(FIRST, SECOND, still=[FIRST]) == 0
+
+
+@pytest.mark.parametrize(
+    ("pieces", "tip", "sure", "seen"),
+    [
+        ((FIRST, SECOND), (6, 13.9), 0.5, True), ((FIRST, SECOND), (6, 14.1), 0.5, False),
+        ((FIRST, SECOND), (6, 11), 0.49, False),  # no tip is found
+        ((FIRST, SECOND), (22, 11), 0.5, False),  # it is the faint one's
+        ((FIRST, (20, 0, 4, 12, 0.9)), (22, 11), 0.5, True),
+        ((FIRST, (12, 0, 4, 12, 0.7)), (6, 11), 0.5, True),
+        ((FIRST, (11, 0, 4, 12, 0.7)), (6, 11), 0.5, False),  # three cells between them
+        (((4, 0, 4, 5, 0.9), SECOND), (6, 4), 0.5, True),  # 20 cells
+        (((4, 0, 19, 1, 0.9), (30, 0, 4, 12, 0.7)), (6, 1), 0.5, False),  # 19
+        (((4, 4, 4, 12, 0.9), SECOND), (6, 11), 0.5, False),  # it comes from nowhere
+    ],
+)  # fmt: skip
+def test_the_arm_that_is_whole_reaches_from_an_edge_to_the_tip(pieces, tip, sure, seen):
+    assert beside(*pieces, tip=tip, sure=sure) == seen
+
+
+@pytest.mark.parametrize(
+    ("hand", "seen"),
+    [(HAND, 1), ((20, 10, 4, 12, 0.79), 0), ((20, 10, 3, 3, 0.9), 0), ((20, 10, 5, 2, 0.9), 1)],
+)
+def test_a_hand_inside_whose_sleeve_is_not_seen_is_another_if_it_is_sure(hand, seen):
+    assert beside(FIRST, hand) == seen
+
+
+@pytest.mark.parametrize(
+    ("other", "share", "seen"),
+    [(SECOND, 4 / 12, 1), (SECOND, 3 / 12, 0), (HAND, 2 / 12, 1), (HAND, 1 / 12, 0)],
+)
+def test_a_quarter_of_an_arm_moves_and_less_of_a_hand_alone(other, share, seen):
+    left, top, width, height, sure = other
+    rests = left, top, width, round((1 - share) * height), sure
+    assert beside(FIRST, other, still=[rests]) == seen
 
 
 # As the shipped detector sees them

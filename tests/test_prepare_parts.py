@@ -26,6 +26,12 @@ ONE = Arms(1.0, 0.0, 0.5, True, 0.0)  # arms that come in
 NONE = Arms(0.0, 0.0, np.nan, False, 0.0)
 
 
+@pytest.fixture(autouse=True)
+def alone(monkeypatch):
+    """One arm, and no other beside it: what the shipped detector sees of that is asked below."""
+    monkeypatch.setattr(sight.Sight, "beside", lambda *what: 0.0)
+
+
 def clip(n=6, height=90, width=160, start=0.0):
     frames = (np.arange(n * height * width * 3) % 251).astype(np.uint8)  # as many colours as a room
     return Clip(frames.reshape(n, height, width, 3), start + np.arange(n) / 20, [], [])
@@ -465,8 +471,33 @@ def test_where_nothing_seems_to_move_an_arm_that_is_seen_does(arms, refused, mon
         with pytest.raises(Unusable, match=r"^nothing moves; film an arm\.$"):
             follow(result, marks)
         assert result.tracks is None
+        monkeypatch.setattr(sight, "vanished", lambda frames: "a thing has left its place")
+        with pytest.raises(Unusable, match=r"^no arm is seen, only something small moves; film"):
+            follow(result, marks)
     else:
         assert follow(result, marks) == "laid"
+
+
+@pytest.mark.parametrize(("share", "two"), [(0.09, False), (0.1, True)])
+def test_an_arm_that_moves_beside_the_one_with_the_tip_is_another_person(share, two, monkeypatch):
+    """The tip of the longest shot, frames 2 to 5, is asked about, as it was found."""
+    found = Found(np.arange(12.0).reshape(6, 2), np.zeros((6, 2)), np.arange(6) / 10, np.zeros(6))
+    asked, off = [], object()
+    monkeypatch.setattr(prepare, "look", lambda sights, frames, cuts, touched: found)
+    monkeypatch.setattr(prepare, "coming_in", lambda sight, off: ONE)
+    monkeypatch.setattr(sight.Sight, "beside", lambda self, *what: asked.append(what) or share)
+    monkeypatch.setattr(
+        prepare.footage, "check", lambda frames, cuts: Footage(frames, [], slice(2, 6), off, False)
+    )
+    monkeypatch.setattr(prepare, "lay", lambda tracks, scene, mirror: "laid")
+    result = prepared(clip=replace(clip(), cuts=[2]))
+    if two:
+        with pytest.raises(Unusable, match="as of several people"):
+            follow(result, Choices())
+    else:
+        assert follow(result, Choices()) == "laid"
+    (moved, tip, sure), = asked  # fmt: skip
+    assert moved is off and tip[0].tolist() == [4, 5] and sure.tolist() == [0.2, 0.3, 0.4, 0.5]
 
 
 @pytest.mark.parametrize("light", ["", " The picture is dark: more light would help."])

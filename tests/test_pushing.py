@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 
 from lbw_minimal.clips.paths import Tracks, Unusable
-from lbw_minimal.clips.pushing import check_apart, check_hand, check_steps, check_way, gets_faster
+from lbw_minimal.clips.pushing import (
+    check_apart,
+    check_hand,
+    check_steps,
+    check_view,
+    check_way,
+    gets_faster,
+)
 
 TOUCH, THERE, N = 20, 40, 50
 WAY = np.clip((np.arange(N) - TOUCH) / (THERE - TOUCH), 0, 1)
@@ -198,3 +205,34 @@ def test_what_leaps_three_fifths_of_its_way_may_be_two_things(leap, back, two):
             check_steps(seen, start, end)
     else:
         check_steps(seen, start, end)
+
+
+def viewed(hand, thing=0.0, sure=1.0):
+    """`check_view` of a hand that goes by `hand` pixels and back, in a picture of 100, and a thing
+    that goes by so many, surely found in that share of 20 frames."""
+    there = np.concatenate([np.linspace(0, 1, 10), np.linspace(1, 0, 10)])
+    places, found = there[:, None] * (0.0, thing), (np.arange(20) < 20 * sure).astype(float)
+    none = np.zeros(0)
+    check_view(Tracks(none, none, places, none, found, 100), there[:, None] * np.array(hand, float))
+
+
+@pytest.mark.parametrize(
+    ("hand", "steep"),
+    [((0, 28), True), ((0, -28), True), ((0, 26), False), ((18, 28), True), ((-19, 28), False)],
+)
+def test_a_hand_that_goes_far_and_steeply_where_nothing_moves_is_not_seen_from_the_side(
+    hand, steep
+):
+    if steep:
+        with pytest.raises(Unusable, match=f"^the hand goes 28 pixels up or down and {hand[0]} "):
+            viewed(hand)
+    else:
+        viewed(hand)
+
+
+def test_how_the_hand_goes_is_not_asked_where_a_thing_is_seen_to_move():
+    viewed((0, 50), thing=7)
+    viewed((0, 50), thing=7, sure=0.5)
+    for seen in (dict(thing=5), dict(thing=7, sure=0.45), dict(thing=50, sure=0)):
+        with pytest.raises(Unusable, match="lift nothing, and film from the side"):
+            viewed((0, 50), **seen)

@@ -2,7 +2,8 @@
 
 There are two witnesses. The detector was taught where arms are in drawings, and sees one that
 hardly moves; of some it is never sure. What moves in over an edge is an arm mostly, and sometimes a
-lamp. One of them is enough to believe in an arm, or in two.
+lamp. One of them is enough to believe in an arm, or in two; where each sees a second one faintly,
+both are.
 In: masks (n, h, w) of some of a shot's frames, as `Detector.look` gives them: how sure each cell
 shows an arm, 0 to 1. A cell is two pixels wide in a picture whose longer side has 84. And how much
 each pixel of some frames is off the room, (T, 84, 84).
@@ -19,6 +20,7 @@ import numpy as np
 from lbw_minimal.clips.footage import EDGE, LARGE, SOMETIMES, at_edge, things
 from lbw_minimal.clips.motion import MOVED, SMALL
 from lbw_minimal.clips.paths import SIDE_ON
+from lbw_minimal.clips.paths import SURE as TIP_SURE
 
 SURE = 0.5  # a cell with more shows an arm
 LEAST = 10  # cells in one piece: fewer are no arm
@@ -34,7 +36,14 @@ SEVERAL = 0.22  # of the frames: with two people it was 0.25 or more, with one 0
 FAINT = 10  # grey levels: at the shoulder an arm moves by little
 COVERS = 0.04  # of the picture: a lamp that swings at its edge covers half of that, an arm twice
 ACROSS = 1.0  # of the width, from edge to edge: between them a lamp may hang beside an arm
+FINGER = 3  # pixels: what is narrower at a side edge touches it, as the hand of an arm from above
 OFTEN = 0.05  # of the frames: an arm at its median place is not told from the room
+# Of a piece's cells: by so many it moves, and a hand inside by fewer, whose sleeve is not seen.
+MOVES, INSIDE = 0.25, 0.15
+AT_TIP = 2.5  # cells: a piece that is so near the tip is that hand's arm
+# Of the frames. Of 97 usable made clips it was 0.02 at most but in one, of real films of one hand
+# 0.05, of two people whom the masks hardly show 0.14 or more.
+BESIDE = 0.1
 
 
 class Arms(NamedTuple):
@@ -47,6 +56,7 @@ class Arms(NamedTuple):
     moves: bool  # whether something as large as an arm moves over an edge
     across: float  # share of the frames in which large things are at both side edges
     below: float = 0.0  # share of the frames in which one comes in over the lower edge alone
+    beside: float = 0.0  # share of the frames in which another moves, see `beside`
 
     @property
     def doubt(self) -> tuple[str, str] | None:
@@ -59,7 +69,7 @@ class Arms(NamedTuple):
             )
         if self.seen < SEEN and not self.moves:
             return "no arm is seen, nothing large that moves comes in from the edge", SIDE_ON
-        if self.several >= SEVERAL or self.across >= OFTEN:
+        if self.several >= SEVERAL or self.across >= OFTEN or self.beside >= BESIDE:
             return (
                 "arms, or other large things, come in at two places, as of several people, or of "
                 "one who fills the picture",
@@ -87,6 +97,37 @@ def count(masks: np.ndarray, off: np.ndarray) -> Arms:
     )
 
 
+def beside(masks: np.ndarray, off: np.ndarray, tip: np.ndarray, sure: np.ndarray) -> float:
+    """The share of n frames in which one arm is whole, from over an edge to its tip, and a piece of
+    another one moves apart from it. So a second person is seen by two faint witnesses.
+
+    masks (n, h, w); off (n, 84, 84) grey levels; tip (n, 2): of the width and of the height; sure
+    (n,): of the tip.
+    """
+    moved = (off > MOVED).astype(np.float32)
+    n = sum(_beside(*one) for one in zip(masks, moved, tip, sure, strict=True))
+    return n / len(masks)
+
+
+def _beside(mask, moved, tip, sure):
+    """The same of one frame."""
+    h, w = mask.shape
+    pieces, moved = list(_pieces(mask)), cv2.resize(moved, (w, h), interpolation=cv2.INTER_AREA)
+    y, x = np.mgrid[:h, :w] + 0.5
+    near = np.hypot(x - w * tip[0], y - h * tip[1]) < AT_TIP
+    for arm in pieces if sure >= TIP_SURE else []:
+        if not (arm.plain and arm.comes and arm.cells.sum() >= MOST and near[arm.cells].any()):
+            continue
+        for other in pieces:
+            if max(other.left - arm.right, arm.left - other.right) < APART:
+                continue
+            least = min(moved[one.cells].mean() for one in (arm, other))
+            inside = other.plain and not other.door.any()
+            if (other.comes and least > MOVES) or (inside and moved[other.cells].mean() > INSIDE):
+                return True
+    return False
+
+
 def _large(found):
     """The arms of each frame; none where not one of them all is large."""
     return found if max((arm[2] for one in found for arm in one), default=0) >= MOST else []
@@ -95,23 +136,41 @@ def _large(found):
 def _coming_in(mask, lower=False):
     """First and last column, cells, and place at the edge, 0 to 1, of each arm in a mask (h, w),
     that comes in over the left, right or upper edge; lower: over the lower one alone."""
+    x = (np.arange(mask.shape[1]) + 0.5)[None] / mask.shape[1] + 0 * mask
+    return [
+        (one.left, one.right, int(one.cells.sum()), float(x[one.door].mean()))
+        for one in _pieces(mask, lower)
+        if one.plain and one.comes
+    ]
+
+
+class _Piece(NamedTuple):
+    """What hangs together of a mask."""
+
+    cells: np.ndarray  # (h, w) bool
+    left: int  # its first column
+    right: int  # the one behind its last
+    door: np.ndarray  # (h, w) bool: its cells near the edges over which it may come in
+    comes: bool  # whether it comes in over one and reaches in
+    plain: bool  # whether it is surely an arm
+
+
+def _pieces(mask, lower=False):
+    """The pieces of a mask (h, w), but for the smallest."""
     h, w = mask.shape
     x, y = np.meshgrid(np.arange(w) + 0.5, np.arange(h) + 0.5)
     others = np.minimum(np.minimum(x, w - x), y)  # cells from the nearest edge
     inside = h - y if lower else others
     n, labels, stats, _ = cv2.connectedComponentsWithStats((mask > SURE).astype(np.uint8))
-    arms = []
     for i in range(1, n):
         left, _, width, _, cells = stats[i].tolist()
+        if cells < LEAST:
+            continue
         piece = labels == i
         door = piece & (inside < NEAR)
-        if cells < LEAST or mask[piece].max() < PLAIN or not door.any():
-            continue
-        if lower and others[piece].min() < NEAR:
-            continue
-        if inside[piece].max() >= REACHES * door.sum() / NEAR:
-            arms.append((left, left + width, cells, float(x[door].mean()) / w))
-    return arms
+        comes = bool(door.any() and inside[piece].max() >= REACHES * door.sum() / NEAR)
+        comes &= not (lower and others[piece].min() < NEAR)
+        yield _Piece(piece, left, left + width, door, comes, bool(mask[piece].max() >= PLAIN))
 
 
 def _comes_in(moves):
@@ -130,7 +189,8 @@ def _doors(moves):
         large = 1 + np.flatnonzero(stats[:, 4] >= LARGE * SMALL**2)
         inside = np.isin(labels, large)
         x = np.flatnonzero(inside[:EDGE].any(0)).tolist()
-        x += [0] * bool(inside[:, :EDGE].any()) + [SMALL - 1] * bool(inside[:, -EDGE:].any())
+        rows = (inside[:, at].any(1).sum() for at in (slice(EDGE), slice(-EDGE, None)))
+        x += [end for end, wide in zip((0, SMALL - 1), rows, strict=True) if wide >= FINGER]
         if x:
             out[t] = min(x) / (SMALL - 1), max(x) / (SMALL - 1)
     return out

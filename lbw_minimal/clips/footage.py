@@ -28,6 +28,7 @@ EDGE = 3  # pixels from the picture's edge, over which an arm comes in
 SPECK = 0.0015  # of the picture, 10 pixels in one piece: noise moves a few, each by itself
 SOMETIMES = 2  # frames in which something moves: noise does so in one
 ENDS = 16  # a clip's first and last frames are so many of it
+ONLY_SMALL = "no arm is seen, only something small moves", SIDE_ON
 
 
 class Footage(NamedTuple):
@@ -72,7 +73,7 @@ def check(frames: np.ndarray, cuts: Sequence[int] = ()) -> Footage:
 def _still(moves):
     """Why nothing large is among what moves (T, 84, 84), and the remedy."""
     if _speck(moves):
-        return "no arm is seen, only something small moves", SIDE_ON
+        return ONLY_SMALL
     said = "nothing moves in the clip, as far as is seen"
     return said, "record from before the hand comes in until all is done"
 

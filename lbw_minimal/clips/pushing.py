@@ -8,7 +8,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from lbw_minimal.clips.paths import RESTS, SIDE_ON, SURE, Tracks, Unusable, interpolate
+from lbw_minimal.clips.paths import (
+    FOUND,
+    LEAST_WAY,
+    RESTS,
+    SIDE_ON,
+    SURE,
+    Tracks,
+    Unusable,
+    extent,
+    interpolate,
+)
 
 LIFTED = 0.2  # of its way: what leaves the straight line by more was picked up
 AHEAD = 0.25  # of its way: a tip so far in front of the object does not push it
@@ -27,6 +37,13 @@ AT_HAND = 0.1
 # Of its way, between two frames in turn in which it is surely seen: a thing that is pushed goes by
 # at most 0.48, and a dot that jumps from one hand to the other by 0.7 to 1.
 LEAP = 0.6
+# Of the picture's shorter side: of made hands that go steeply where nothing moves, 0.22 at most; of
+# those that push in front of the camera, or behind it, 0.32 or more.
+LONG = 0.27
+# Height over width of the way of a hand that touches nothing, which may come down to its mark.
+# Hands seen from the side had up to 1.1, but for one; made ones from the front or from straight
+# above had 2.6 and more.
+STEEP_HAND = 1.5
 STRIDE = 4  # steps, over which a speed is taken
 FASTEST = 0.95  # of the highest speed: the rest is noise
 
@@ -69,6 +86,28 @@ def check_way(
             "the object comes towards the arm, or the hand is in front of it",
             "push it away from the arm, with one hand, which is behind it",
         )
+
+
+def check_view(tracks: Tracks, tip: np.ndarray) -> None:
+    """Raise Unusable where no object is seen to move, and the hand, its tip (N, 2) pixels, goes a
+    long way up or down the picture: then it takes the object along in front of the camera or
+    behind it, or lifts it."""
+    sure = tracks.object_sure >= SURE
+    if sure.mean() >= FOUND and extent(tracks.object[sure]) >= LEAST_WAY * tracks.side:
+        return
+    far = tip[np.linalg.norm(tip - tip[0], axis=1).argmax()] - tip[0]
+    if abs(far[1]) > max(LONG * tracks.side, STEEP_HAND * abs(far[0])):
+        raise steep("the hand", far, touched=True)
+
+
+def steep(what: str, way: np.ndarray, touched: bool) -> Unusable:
+    """The error for a way (2,) pixels of the hand or the object, `what`, that is not one across the
+    picture."""
+    return Unusable(
+        f"{what} goes {abs(way[1]):.0f} pixels up or down and {abs(way[0]):.0f} across",
+        "lift nothing, and " * touched
+        + "film from the side, at the height of the table, so that it goes across the picture",
+    )
 
 
 def check_apart(apart: np.ndarray, along: np.ndarray, side: int) -> None:

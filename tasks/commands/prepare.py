@@ -194,7 +194,7 @@ def follow(result: Prepared, choices: Choices) -> Motion:
     longest = sights[[0, *clip.cuts].index(seen.shot.start)]
     arm = coming_in(longest, seen.off)
     if seen.still and arm.seen < arms.SEEN:
-        raise Unusable(*seen.still)
+        raise Unusable(*(footage.ONLY_SMALL if longest.vanished else seen.still))
     found = look(sights, frames, clip.cuts, result.scene.contact is not None)
     result.light = partial(light.poor, frames[seen.shot], found.tip_sure[seen.shot])
     tracks = Tracks(
@@ -204,9 +204,10 @@ def follow(result: Prepared, choices: Choices) -> Motion:
     tracks = tracks.marked("tip", list(choices.tip)).marked("object", list(choices.object))
     result.tracks, result.notes = tracks, result.notes + [choices.placed] * bool(choices.placed)
     unplaced = result.scene.contact is not None and not choices.object
+    hand = tracks.tip[seen.shot], tracks.tip_sure[seen.shot]
     if unplaced:  # before arms are counted: one that is before a thing reaches far into the picture
-        hand = tracks.tip[seen.shot], tracks.tip_sure[seen.shot]
         vanished.check_seen(longest.vanished, *hand)
+    arm = arm._replace(beside=longest.beside(seen.off, *hand))
     if arm.doubt:
         if not choices.tip:
             raise Unusable(*arm.doubt)
