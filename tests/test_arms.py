@@ -262,6 +262,15 @@ def test_the_arm_that_is_whole_reaches_from_an_edge_to_the_tip(pieces, tip, sure
     assert beside(*pieces, tip=tip, sure=sure) == seen
 
 
+@pytest.mark.parametrize(("rows", "seen"), [(6, 0), (5, 0.5)])
+def test_what_moves_where_the_arm_stood_first_may_be_the_room(rows, seen):
+    """Six of twelve rows of the other piece were the arm's."""
+    stood, goes = mask((20, 0, 4, rows, 0.9), (20, 0, 6, 4, 0.9)), mask(FIRST, SECOND)
+    off = 17.0 * np.stack([cv2.resize(np.ceil(one), (84, 84)) > 0 for one in (stood, goes)])
+    tips = np.array([(22, rows), (6, 11)]) / (W, H)
+    assert arms.beside(np.stack([stood, goes]), off, tips, np.ones(2)) == seen
+
+
 @pytest.mark.parametrize(
     ("hand", "seen"),
     [(HAND, 1), ((20, 10, 4, 12, 0.79), 0), ((20, 10, 3, 3, 0.9), 0), ((20, 10, 5, 2, 0.9), 1)],

@@ -179,6 +179,7 @@ def test_patches_mend_what_a_detector_finds_in_each_shot_and_corners_refine_it(m
 
     monkeypatch.setattr(prepare, "mended", mended)
     monkeypatch.setattr(prepare, "gone", lambda found: 0.0)
+    monkeypatch.setattr(prepare, "of_hand", lambda found, side: False)
     monkeypatch.setattr(prepare, "refine", lambda seen, found, cuts: (cuts, seen is frames, found))
     model = SimpleNamespace(look=lambda seen: None, detect=detect)
     cuts, same, found = prepare.look(sight.shots(model, frames, [1]), frames, [1], True)
@@ -217,24 +218,29 @@ def test_the_surer_look_counts_and_for_a_hand_that_touches_nothing_the_one_at_wh
     monkeypatch.setattr(prepare, "mended", lambda frames, found: (found, True))
     monkeypatch.setattr(prepare.vanished, "followed", lambda thing, frames, found: found)
     monkeypatch.setattr(prepare, "gone", lambda found: 0.0)
+    monkeypatch.setattr(prepare, "of_hand", lambda found, side: False)
     found = prepare.looked(seen_by(detect, frames), touched)
     assert found.tip.tolist() == tip and found.object.tolist() == thing
     assert found.tip_sure[0] == (0.9 if touched else 0.54) and found.object_sure[0] == 0.9
 
 
 @pytest.mark.parametrize(
-    ("ways", "pushed", "touched", "object_"),
+    ("ways", "pushed", "hand", "touched", "object_"),
     [
-        ((5, 3, 4), (0, 0, 0), True, 0),
-        ((5, 5, 9), (1, 1, 1), True, 2),
-        ((5, 9, 5), (0, 0, 0), True, 1),
-        ((5, 9, 4), (0, 0, 1), True, 2),
-        ((5, 9, 9), (0, 1, 1), False, 0),
+        ((5, 3, 4), (0, 0, 0), "", True, 0),
+        ((5, 5, 9), (1, 1, 1), "", True, 2),
+        ((5, 9, 5), (0, 0, 0), "", True, 1),
+        ((5, 9, 4), (0, 0, 1), "", True, 2),
+        ((5, 9, 7), (1, 1, 1), "1", True, 2),
+        ((5, 9, 7), (0, 1, 0), "1", True, 1),
+        ((5, 9, 7), (1, 1, 1), "012", True, 1),
+        ((5, 9, 9), (0, 1, 1), "", False, 0),
     ],
-    ids=["the-surer", "at-what-moves", "at-all", "as-one-that-is-pushed", "nothing-is-touched"],
-)
+    ids=["the-surer", "at-what-moves", "at-all", "as-one-that-is-pushed", "no-piece-of-the-hand",
+         "the-only-one-that-is-pushed", "all-are-of-the-hand", "nothing-is-touched"],
+)  # fmt: skip
 def test_of_what_patches_make_of_the_looks_the_object_is_pushed_or_else_goes_farthest(
-    ways, pushed, touched, object_, monkeypatch
+    ways, pushed, hand, touched, object_, monkeypatch
 ):
     """The tip stays the surer look's. Patches are asked of it, of the whole look, of the other."""
     asked = []
@@ -250,6 +256,7 @@ def test_of_what_patches_make_of_the_looks_the_object_is_pushed_or_else_goes_far
     monkeypatch.setattr(prepare, "mended", mended)
     monkeypatch.setattr(prepare.vanished, "followed", lambda thing, frames, found: found)
     monkeypatch.setattr(prepare, "gone", lambda found: ways[found.object[0]])
+    monkeypatch.setattr(prepare, "of_hand", lambda found, side: str(found.object[0]) in hand)
     frames = np.zeros((5, 84, 84, 3), np.uint8)
     frames[:3, 40:50, 20:30] = frames[3:, 40:50, 50:60] = 200
     found = prepare.looked(seen_by(detect, frames), touched)
@@ -324,6 +331,7 @@ def test_the_shipped_detector_is_loaded_once_and_looks_once_at_a_frame_for_all_t
     monkeypatch.setattr(sight, "vanished", lambda frames: compared.append(len(frames)))
     monkeypatch.setattr(prepare, "mended", lambda frames, found: (found, True))
     monkeypatch.setattr(prepare, "gone", lambda found: 0.0)
+    monkeypatch.setattr(prepare, "of_hand", lambda found, side: False)
     monkeypatch.setattr(prepare.vanished, "followed", lambda thing, frames, found: found)
     monkeypatch.setattr(prepare.vanished, "check_seen", check_seen)
     scene = SimpleNamespace(contact=0.04)

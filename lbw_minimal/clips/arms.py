@@ -41,6 +41,9 @@ OFTEN = 0.05  # of the frames: an arm at its median place is not told from the r
 # Of a piece's cells: by so many it moves, and a hand inside by fewer, whose sleeve is not seen.
 MOVES, INSIDE = 0.25, 0.15
 AT_TIP = 2.5  # cells: a piece that is so near the tip is that hand's arm
+FIRST = (
+    0.5  # of a piece's cells, where the arm stood first: an arm that rests there is in the median
+)
 # Of the frames. Of 97 usable made clips it was 0.02 at most but in one, of real films of one hand
 # 0.05, of two people whom the masks hardly show 0.14 or more.
 BESIDE = 0.1
@@ -104,28 +107,32 @@ def beside(masks: np.ndarray, off: np.ndarray, tip: np.ndarray, sure: np.ndarray
     masks (n, h, w); off (n, 84, 84) grey levels; tip (n, 2): of the width and of the height; sure
     (n,): of the tip.
     """
-    moved = (off > MOVED).astype(np.float32)
-    n = sum(_beside(*one) for one in zip(masks, moved, tip, sure, strict=True))
-    return n / len(masks)
+    _, h, w = masks.shape
+    first, seen = np.zeros((h, w), bool), 0
+    for mask, differs, at, known in zip(masks, off > MOVED, tip, sure, strict=True):
+        pieces, near = list(_pieces(mask)), _near(at, h, w) & (known >= TIP_SURE)
+        arms = [one for one in pieces if one.whole and near[one.cells].any()]
+        if not first.any():  # what is off the room there later on may be the room
+            first = sum((one.cells for one in arms), first)
+        moved = cv2.resize(differs.astype(np.float32), (w, h), interpolation=cv2.INTER_AREA)
+        others = [one for one in pieces if first[one.cells].mean() < FIRST]
+        seen += any(_moves_beside(arm, one, moved) for arm in arms for one in others)
+    return seen / len(masks)
 
 
-def _beside(mask, moved, tip, sure):
-    """The same of one frame."""
-    h, w = mask.shape
-    pieces, moved = list(_pieces(mask)), cv2.resize(moved, (w, h), interpolation=cv2.INTER_AREA)
+def _near(tip, h, w):
+    """The cells (h, w) bool about a tip (2,)."""
     y, x = np.mgrid[:h, :w] + 0.5
-    near = np.hypot(x - w * tip[0], y - h * tip[1]) < AT_TIP
-    for arm in pieces if sure >= TIP_SURE else []:
-        if not (arm.plain and arm.comes and arm.cells.sum() >= MOST and near[arm.cells].any()):
-            continue
-        for other in pieces:
-            if max(other.left - arm.right, arm.left - other.right) < APART:
-                continue
-            least = min(moved[one.cells].mean() for one in (arm, other))
-            inside = other.plain and not other.door.any()
-            if (other.comes and least > MOVES) or (inside and moved[other.cells].mean() > INSIDE):
-                return True
-    return False
+    return np.hypot(x - w * tip[0], y - h * tip[1]) < AT_TIP
+
+
+def _moves_beside(arm, other, moved):
+    """Whether another piece, apart from an arm, moves, by how much each cell (h, w) has moved."""
+    if max(other.left - arm.right, arm.left - other.right) < APART:
+        return False
+    mine, its = (moved[one.cells].mean() for one in (arm, other))
+    inside = other.plain and not other.door.any()
+    return (other.comes and min(mine, its) > MOVES) or (inside and its > INSIDE)
 
 
 def _large(found):
@@ -153,6 +160,11 @@ class _Piece(NamedTuple):
     door: np.ndarray  # (h, w) bool: its cells near the edges over which it may come in
     comes: bool  # whether it comes in over one and reaches in
     plain: bool  # whether it is surely an arm
+
+    @property
+    def whole(self) -> bool:
+        """Whether it is all of an arm, if it has the tip."""
+        return bool(self.plain and self.comes and self.cells.sum() >= MOST)
 
 
 def _pieces(mask, lower=False):

@@ -116,15 +116,21 @@ def check_apart(apart: np.ndarray, along: np.ndarray, side: int) -> None:
     apart (n, 2) pixels: from the object to the tip, until the object is there; along (2,): its way;
     side: of the picture, the shorter one.
     """
-    length = np.linalg.norm(along)
-    glued = np.linalg.norm(np.ptp(apart, axis=0)) < GLUED * length
-    at_hand = np.linalg.norm(apart, axis=1).max() < AT_HAND * side and along[1] > abs(along[0])
-    if (glued or at_hand) and along[1] > COMES_DOWN * length:
+    if is_hand(apart, along, side):
         raise Unusable(
             "the object never moves: what goes with the hand from the start, and comes down with "
             "it, is the hand",
             "film the task being done, with an object that is seen before the hand gets to it",
         )
+
+
+def is_hand(apart: np.ndarray, along: np.ndarray, side: int) -> bool:
+    """Whether what goes along (2,), apart (n, 2) pixels from the tip, is a piece of the hand: it
+    stays so far from the tip, or near it, and comes down."""
+    length = np.linalg.norm(along)
+    glued = np.linalg.norm(np.ptp(apart, axis=0)) < GLUED * length
+    at_hand = np.linalg.norm(apart, axis=1).max() < AT_HAND * side and along[1] > abs(along[0])
+    return bool((glued or at_hand) and along[1] > COMES_DOWN * length)
 
 
 def check_hand(tracks: Tracks, t: np.ndarray, thing: np.ndarray, along: np.ndarray) -> None:
