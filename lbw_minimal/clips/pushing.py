@@ -18,6 +18,7 @@ from lbw_minimal.clips.paths import (
     Unusable,
     extent,
     interpolate,
+    median3,
 )
 
 LIFTED = 0.2  # of its way: what leaves the straight line by more was picked up
@@ -37,9 +38,9 @@ AT_HAND = 0.1
 # Of its way, between two frames in turn in which it is surely seen: a thing that is pushed goes by
 # at most 0.48, and a dot that jumps from one hand to the other by 0.7 to 1.
 LEAP = 0.6
-# Of the picture's shorter side: of made hands that go steeply where nothing moves, 0.22 at most; of
-# those that push in front of the camera, or behind it, 0.32 or more.
-LONG = 0.27
+# Of the picture's shorter side: of made hands that go steeply where nothing moves, 0.24 at most; of
+# those that push in front of the camera, or behind it, 0.39 or more.
+LONG = 0.3
 # Height over width of the way of a hand that touches nothing, which may come down to its mark.
 # Hands seen from the side had up to 1.1, but for one; made ones from the front or from straight
 # above had 2.6 and more.
@@ -88,15 +89,18 @@ def check_way(
         )
 
 
-def check_view(tracks: Tracks, tip: np.ndarray) -> None:
-    """Raise Unusable where no object is seen to move, and the hand, its tip (N, 2) pixels, goes a
-    long way up or down the picture: then it takes the object along in front of the camera or
-    behind it, or lifts it."""
+def check_view(tracks: Tracks) -> None:
+    """Raise Unusable where no object is seen to move, and the hand goes a long way up or down the
+    picture: then it takes the object along in front of the camera or behind it, or lifts it. A tip
+    that leaps is no hand that goes."""
     sure = tracks.object_sure >= SURE
     if sure.mean() >= FOUND and extent(tracks.object[sure]) >= LEAST_WAY * tracks.side:
         return
+    tip = median3(tracks.tip[tracks.tip_sure >= SURE])
     far = tip[np.linalg.norm(tip - tip[0], axis=1).argmax()] - tip[0]
-    if abs(far[1]) > max(LONG * tracks.side, STEEP_HAND * abs(far[0])):
+    leap = np.linalg.norm(np.diff(tip, axis=0), axis=1).max(initial=0)
+    long = max(LONG * tracks.side, STEEP_HAND * abs(far[0]))
+    if abs(far[1]) > long and leap < LEAP * np.linalg.norm(far):
         raise steep("the hand", far, touched=True)
 
 

@@ -99,7 +99,7 @@ def lay(tracks: Tracks, scene: Scene, mirror: bool | None = None) -> Motion:
     t = np.arange(tracks.times[0], tracks.times[-1] + 1e-9, 1 / FPS)
     tip = thing = low_pass(*trusted(tracks, "tip"), t)  # (N, 2) pixels
     if touched:
-        pushing.check_view(tracks, tip)
+        pushing.check_view(tracks)
         s, seen = trusted(tracks, "object")
         thing = low_pass(s, seen, t)
     else:
