@@ -289,6 +289,41 @@ def test_a_quarter_of_an_arm_moves_and_less_of_a_hand_alone(other, share, seen):
     assert beside(FIRST, other, still=[rests]) == seen
 
 
+# A room that moves
+
+
+def stirs(*boxes, arm=(), grey=17):
+    off = np.stack([grey * moving(*boxes), np.zeros((84, 84))]).astype(float)
+    return arms.room(np.stack([mask(*arm)] * 2), off)
+
+
+def test_a_room_moves_over_a_share_of_the_width_the_mean_of_all_frames():
+    assert stirs() == 0
+    assert stirs((0, 10, 84, 1)) == 0.5
+    assert stirs((0, 10, 84, 1), grey=16) == 0
+    assert stirs((0, 10, 7, 1)) == stirs((0, 10, 7, 40)) == pytest.approx(1 / 24)
+    assert stirs((0, 10, 3, 1)) == pytest.approx(1 / 24)  # 3 of 49 pixels
+    assert stirs((0, 10, 2, 1)) == 0
+    assert stirs((0, 76, 84, 1)) == 0.5
+    assert stirs((0, 77, 84, 7)) == 0  # the lowest
+
+
+def test_what_is_near_an_arm_is_not_asked():
+    """Cells 8 to 11 of 42 are pixels 16 to 23, and those up to four away are near it: the pieces
+    from the second to the fourth."""
+    assert stirs((0, 10, 84, 1), arm=[(8, 0, 4, 32, 0.9)]) == pytest.approx(9 / 24)
+    assert stirs((0, 10, 84, 1), arm=[(8, 0, 4, 32, 0.4)]) == 0.5
+
+
+@pytest.mark.parametrize(
+    ("several", "seen", "said"),
+    [(0.21, 1.0, "the camera moves"), (0.22, 1.0, "arms, or"), (0.0, 0.0, "no arm is seen")],
+)
+def test_two_arms_that_are_seen_and_none_are_told_before_a_room_that_moves(several, seen, said):
+    found = arms.Arms(seen, several, 0.5, False, 1.0, room=0.4)
+    assert found.doubt[0].startswith(said) and found._replace(room=0.39).doubt[0][:3] != "the"
+
+
 # As the shipped detector sees them
 
 

@@ -28,8 +28,9 @@ NONE = Arms(0.0, 0.0, np.nan, False, 0.0)
 
 @pytest.fixture(autouse=True)
 def alone(monkeypatch):
-    """One arm, and no other beside it: what the shipped detector sees of that is asked below."""
+    """One arm, no other beside it, and a room that stands: what a shot is asked is told below."""
     monkeypatch.setattr(sight.Sight, "beside", lambda *what: 0.0)
+    monkeypatch.setattr(sight.Sight, "room", lambda *what: 0.0)
 
 
 def clip(n=6, height=90, width=160, start=0.0):
@@ -506,6 +507,25 @@ def test_an_arm_that_moves_beside_the_one_with_the_tip_is_another_person(share, 
         assert follow(result, Choices()) == "laid"
     (moved, tip, sure), = asked  # fmt: skip
     assert moved is off and tip[0].tolist() == [4, 5] and sure.tolist() == [0.2, 0.3, 0.4, 0.5]
+
+
+@pytest.mark.parametrize(("share", "moves"), [(0.39, False), (0.4, True)])
+def test_a_room_that_moves_though_it_was_steadied_is_before_a_camera_that_does(
+    share, moves, monkeypatch
+):
+    nothing = Found(np.zeros((6, 2)), np.zeros((6, 2)), np.zeros(6), np.zeros(6))
+    asked, seen = [], Footage(np.zeros((6, 90, 160, 3)), [], slice(0, 6), None, False)
+    monkeypatch.setattr(prepare, "look", lambda sights, frames, cuts, touched: nothing)
+    monkeypatch.setattr(prepare, "coming_in", lambda sight, off: ONE)
+    monkeypatch.setattr(sight.Sight, "room", lambda self, what: asked.append(what) or share)
+    monkeypatch.setattr(prepare.footage, "check", lambda frames, cuts: seen)
+    monkeypatch.setattr(prepare, "lay", lambda tracks, scene, mirror: "laid")
+    if moves:
+        with pytest.raises(Unusable, match=r"^the camera moves; put it on a stand"):
+            follow(prepared(), Choices())
+    else:
+        assert follow(prepared(), Choices()) == "laid"
+    assert asked == [seen]
 
 
 @pytest.mark.parametrize("light", ["", " The picture is dark: more light would help."])

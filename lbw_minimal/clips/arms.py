@@ -17,7 +17,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from lbw_minimal.clips.footage import EDGE, LARGE, SOMETIMES, at_edge, things
+from lbw_minimal.clips.footage import CAMERA, EDGE, LARGE, SOMETIMES, at_edge, things
 from lbw_minimal.clips.motion import MOVED, SMALL
 from lbw_minimal.clips.paths import SIDE_ON
 from lbw_minimal.clips.paths import SURE as TIP_SURE
@@ -41,12 +41,15 @@ OFTEN = 0.05  # of the frames: an arm at its median place is not told from the r
 # Of a piece's cells: by so many it moves, and a hand inside by fewer, whose sleeve is not seen.
 MOVES, INSIDE = 0.25, 0.15
 AT_TIP = 2.5  # cells: a piece that is so near the tip is that hand's arm
-FIRST = (
-    0.5  # of a piece's cells, where the arm stood first: an arm that rests there is in the median
-)
+FIRST = 0.5  # of a piece's cells, where the arm stood first: that may be the room, seen again
 # Of the frames. Of 97 usable made clips it was 0.02 at most but in one, of real films of one hand
 # 0.05, of two people whom the masks hardly show 0.14 or more.
 BESIDE = 0.1
+BLOCK, ABOUT = 7, 9  # pixels: of a side of the room's pieces; those that near an arm are not asked
+TOUCHED = 0.05  # of a piece
+# Of the width. Of 60 usable made clips that were steadied it was 0.28 at most, of two pans and a
+# zoom that had been steadied by too little 0.48 or more.
+ROOM = 0.4
 
 
 class Arms(NamedTuple):
@@ -60,11 +63,12 @@ class Arms(NamedTuple):
     across: float  # share of the frames in which large things are at both side edges
     below: float = 0.0  # share of the frames in which one comes in over the lower edge alone
     beside: float = 0.0  # share of the frames in which another moves, see `beside`
+    room: float = 0.0  # of what was steadied: by how much the room still moves, see `room`
 
     @property
     def doubt(self) -> tuple[str, str] | None:
-        """Why the shot may show no arm, one from the camera's side, or several people, and what to
-        film otherwise."""
+        """Why the shot may show no arm, one from the camera's side, a moving room, or several
+        people, and what to film otherwise."""
         if self.seen < SEEN <= self.below:  # what one wears or holds and films with sees it so
             return (
                 "the arm comes in over the lower edge, as from the camera, and hides what it is at",
@@ -72,6 +76,8 @@ class Arms(NamedTuple):
             )
         if self.seen < SEEN and not self.moves:
             return "no arm is seen, nothing large that moves comes in from the edge", SIDE_ON
+        if self.several < SEVERAL and self.room >= ROOM:
+            return CAMERA
         if self.several >= SEVERAL or self.across >= OFTEN or self.beside >= BESIDE:
             return (
                 "arms, or other large things, come in at two places, as of several people, or of "
@@ -118,6 +124,26 @@ def beside(masks: np.ndarray, off: np.ndarray, tip: np.ndarray, sure: np.ndarray
         others = [one for one in pieces if first[one.cells].mean() < FIRST]
         seen += any(_moves_beside(arm, one, moved) for arm in arms for one in others)
     return seen / len(masks)
+
+
+def room(masks: np.ndarray, off: np.ndarray) -> float:
+    """Over which share of the width something is off the room that is no arm, the mean of n frames.
+    Where a camera was steadied and it is much of it, the room itself still moves.
+
+    masks (n, h, w); off (n, 84, 84) grey levels. A table or a body moves over the lower edge, so
+    the lowest pixels are not asked.
+    """
+    shares = []
+    for mask, differs in zip(masks, off, strict=True):
+        arm = (cv2.resize(mask, (SMALL, SMALL)) > SURE).astype(np.uint8)
+        arm = cv2.dilate(arm, np.ones((ABOUT, ABOUT)))
+        moved, arms = (
+            one.reshape(SMALL // BLOCK, BLOCK, -1, BLOCK).mean((1, 3))
+            for one in (differs > MOVED, arm)
+        )
+        touched = (moved > TOUCHED) & (arms == 0)
+        shares.append(touched[:-1].any(axis=0).mean())
+    return float(np.mean(shares))
 
 
 def _near(tip, h, w):

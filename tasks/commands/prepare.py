@@ -207,7 +207,7 @@ def follow(result: Prepared, choices: Choices) -> Motion:
     hand = tracks.tip[seen.shot], tracks.tip_sure[seen.shot]
     if unplaced:  # before arms are counted: one that is before a thing reaches far into the picture
         vanished.check_seen(longest.vanished, *hand)
-    arm = arm._replace(beside=longest.beside(seen.off, *hand))
+    arm = arm._replace(beside=longest.beside(seen.off, *hand), room=longest.room(seen))
     if arm.doubt:
         if not choices.tip:
             raise Unusable(*arm.doubt)
