@@ -242,6 +242,7 @@ def test_a_faint_arm_that_moves_beside_one_with_the_tip_is_another():
     assert beside(FIRST, SECOND, frames=4) == 0.25
     assert beside(FIRST) == 0
     assert beside(FIRST, SECOND, still=[SECOND]) == beside(FIRST, SECOND, still=[FIRST]) == 0
+    assert beside(FIRST, HAND, still=[FIRST]) == 1
 
 
 @pytest.mark.parametrize(
@@ -281,9 +282,9 @@ def test_a_hand_inside_whose_sleeve_is_not_seen_is_another_if_it_is_sure(hand, s
 
 @pytest.mark.parametrize(
     ("other", "share", "seen"),
-    [(SECOND, 4 / 12, 1), (SECOND, 3 / 12, 0), (HAND, 2 / 12, 1), (HAND, 1 / 12, 0)],
+    [(SECOND, 4 / 12, 1), (SECOND, 3 / 12, 0), (HAND, 4 / 12, 1), (HAND, 3 / 12, 0)],
 )
-def test_a_quarter_of_an_arm_moves_and_less_of_a_hand_alone(other, share, seen):
+def test_more_than_a_quarter_of_an_arm_and_of_a_hand_alone_moves(other, share, seen):
     left, top, width, height, sure = other
     rests = left, top, width, round((1 - share) * height), sure
     assert beside(FIRST, other, still=[rests]) == seen
