@@ -1,5 +1,6 @@
 """How many arms come into a clip, and where: by masks drawn by hand and by the detector's."""
 
+import cv2
 import numpy as np
 import pytest
 from toy_clips import arm, room
@@ -205,6 +206,123 @@ def test_an_arm_comes_in_beside_something_larger_that_does_not():
     assert arms._comes_in(np.stack([moving(arm, toy)] * 2))
     assert not arms._comes_in(np.stack([moving(lamp, toy)] * 2))
     assert not arms._comes_in(np.stack([moving()] * 2))
+
+
+@pytest.mark.parametrize(("rows", "across"), [(2, 0), (3, 1)])
+def test_a_door_at_a_side_edge_is_three_pixels_wide(rows, across):
+    """A hand that reaches to the other edge touches it with less."""
+    off = np.zeros((4, 84, 84))
+    off[:, 30:45, :20] = off[:, 30 : 30 + rows, 60:] = off[:, 30:45, 60:75] = 17
+    assert arms.count(np.zeros((4, H, W), np.float32), off).across == across
+
+
+# An arm that moves beside the one that has the tip
+
+
+FIRST, SECOND, HAND = (4, 0, 4, 12, 0.9), (20, 0, 4, 12, 0.7), (20, 10, 4, 12, 0.9)
+
+
+def beside(*pieces, still=(), tip=(6.0, 11.0), sure=0.5, frames=1):
+    """`arms.beside` for one of so many frames: tip in cells; still: where nothing moves."""
+    shown, moved = mask(*pieces), mask(*pieces) > 0
+    for left, top, width, height, _ in still:
+        moved[top : top + height, left : left + width] = False
+    off = 17.0 * cv2.resize(moved.astype(np.float32), (84, 84), interpolation=cv2.INTER_NEAREST)
+    others = frames - 1
+    return arms.beside(
+        np.stack([shown, *[mask()] * others]),
+        np.stack([off, *[0 * off] * others]),
+        np.array([tip] * frames) / (W, H),
+        np.full(frames, sure),
+    )
+
+
+def test_a_faint_arm_that_moves_beside_one_with_the_tip_is_another():
+    assert beside(FIRST, SECOND) == 1
+    assert beside(FIRST, SECOND, frames=4) == 0.25
+    assert beside(FIRST) == 0
+    assert beside(FIRST, SECOND, still=[SECOND]) == beside(FIRST, SECOND, still=[FIRST]) == 0
+    assert beside(FIRST, HAND, still=[FIRST]) == 1
+
+
+@pytest.mark.parametrize(
+    ("pieces", "tip", "sure", "seen"),
+    [
+        ((FIRST, SECOND), (6, 13.9), 0.5, True), ((FIRST, SECOND), (6, 14.1), 0.5, False),
+        ((FIRST, SECOND), (6, 11), 0.49, False),  # no tip is found
+        ((FIRST, SECOND), (22, 11), 0.5, False),  # it is the faint one's
+        ((FIRST, (20, 0, 4, 12, 0.9)), (22, 11), 0.5, True),
+        ((FIRST, (12, 0, 4, 12, 0.7)), (6, 11), 0.5, True),
+        ((FIRST, (11, 0, 4, 12, 0.7)), (6, 11), 0.5, False),  # three cells between them
+        (((4, 0, 4, 5, 0.9), SECOND), (6, 4), 0.5, True),  # 20 cells
+        (((4, 0, 19, 1, 0.9), (30, 0, 4, 12, 0.7)), (6, 1), 0.5, False),  # 19
+        (((4, 4, 4, 12, 0.9), SECOND), (6, 11), 0.5, False),  # it comes from nowhere
+    ],
+)  # fmt: skip
+def test_the_arm_that_is_whole_reaches_from_an_edge_to_the_tip(pieces, tip, sure, seen):
+    assert beside(*pieces, tip=tip, sure=sure) == seen
+
+
+@pytest.mark.parametrize(("rows", "seen"), [(6, 0), (5, 0.5)])
+def test_what_moves_where_the_arm_stood_first_may_be_the_room(rows, seen):
+    """Six of twelve rows of the other piece were the arm's."""
+    stood, goes = mask((20, 0, 4, rows, 0.9), (20, 0, 6, 4, 0.9)), mask(FIRST, SECOND)
+    off = 17.0 * np.stack([cv2.resize(np.ceil(one), (84, 84)) > 0 for one in (stood, goes)])
+    tips = np.array([(22, rows), (6, 11)]) / (W, H)
+    assert arms.beside(np.stack([stood, goes]), off, tips, np.ones(2)) == seen
+
+
+@pytest.mark.parametrize(
+    ("hand", "seen"),
+    [(HAND, 1), ((20, 10, 4, 12, 0.79), 0), ((20, 10, 3, 3, 0.9), 0), ((20, 10, 5, 2, 0.9), 1)],
+)
+def test_a_hand_inside_whose_sleeve_is_not_seen_is_another_if_it_is_sure(hand, seen):
+    assert beside(FIRST, hand) == seen
+
+
+@pytest.mark.parametrize(
+    ("other", "share", "seen"),
+    [(SECOND, 4 / 12, 1), (SECOND, 3 / 12, 0), (HAND, 4 / 12, 1), (HAND, 3 / 12, 0)],
+)
+def test_more_than_a_quarter_of_an_arm_and_of_a_hand_alone_moves(other, share, seen):
+    left, top, width, height, sure = other
+    rests = left, top, width, round((1 - share) * height), sure
+    assert beside(FIRST, other, still=[rests]) == seen
+
+
+# A room that moves
+
+
+def stirs(*boxes, arm=(), grey=17):
+    off = np.stack([grey * moving(*boxes), np.zeros((84, 84))]).astype(float)
+    return arms.room(np.stack([mask(*arm)] * 2), off)
+
+
+def test_a_room_moves_over_a_share_of_the_width_the_mean_of_all_frames():
+    assert stirs() == 0
+    assert stirs((0, 10, 84, 1)) == 0.5
+    assert stirs((0, 10, 84, 1), grey=16) == 0
+    assert stirs((0, 10, 7, 1)) == stirs((0, 10, 7, 40)) == pytest.approx(1 / 24)
+    assert stirs((0, 10, 3, 1)) == pytest.approx(1 / 24)  # 3 of 49 pixels
+    assert stirs((0, 10, 2, 1)) == 0
+    assert stirs((0, 76, 84, 1)) == 0.5
+    assert stirs((0, 77, 84, 7)) == 0  # the lowest
+
+
+def test_what_is_near_an_arm_is_not_asked():
+    """Cells 8 to 11 of 42 are pixels 16 to 23, and those up to four away are near it: the pieces
+    from the second to the fourth."""
+    assert stirs((0, 10, 84, 1), arm=[(8, 0, 4, 32, 0.9)]) == pytest.approx(9 / 24)
+    assert stirs((0, 10, 84, 1), arm=[(8, 0, 4, 32, 0.4)]) == 0.5
+
+
+@pytest.mark.parametrize(
+    ("several", "seen", "said"),
+    [(0.21, 1.0, "the camera moves"), (0.22, 1.0, "arms, or"), (0.0, 0.0, "no arm is seen")],
+)
+def test_two_arms_that_are_seen_and_none_are_told_before_a_room_that_moves(several, seen, said):
+    found = arms.Arms(seen, several, 0.5, False, 1.0, room=0.4)
+    assert found.doubt[0].startswith(said) and found._replace(room=0.39).doubt[0][:3] != "the"
 
 
 # As the shipped detector sees them

@@ -194,6 +194,8 @@ def test_a_clip_is_searched_with_its_marks_and_its_shorter_side_as_it_was(monkey
     monkeypatch.setattr(prepare.footage, "check", lambda frames, cuts: Footage(
         255 - frames, ["It trembles."], slice(0, 40), None, True))  # fmt: skip
     monkeypatch.setattr(prepare, "coming_in", lambda sight, off: Arms(1.0, 0.0, 0.3, True, 0.0))
+    monkeypatch.setattr(prepare.Sight, "beside", lambda *what: 0.0)
+    monkeypatch.setattr(prepare.Sight, "room", lambda *what: 0.0)
     scene = SimpleNamespace(contact=0.04, name="scene")
     result = prepare.Prepared(clip, scene, warnings=["read"])
     marks = Choices(tip=((30.0, 40.0, 1.2), (50.0, 60.0, 1.5)), object=((90.0, 60.0, 2.0),))

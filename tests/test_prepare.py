@@ -302,6 +302,8 @@ def test_what_was_found_is_laid_by_the_clips_shorter_side_cuts_and_marks(monkeyp
         lambda frames, cuts: Footage(frames, [f"cut at {cuts}"], slice(0, 4), None, True),
     )
     arm, shots = Arms(1.0, 0.0, 0.2, True, 0.0), []
+    monkeypatch.setattr(prepare.Sight, "beside", lambda *what: 0.0)
+    monkeypatch.setattr(prepare.Sight, "room", lambda *what: 0.0)
     monkeypatch.setattr(
         prepare, "coming_in", lambda sight, off: shots.append(len(sight.frames)) or arm
     )

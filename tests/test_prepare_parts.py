@@ -26,6 +26,13 @@ ONE = Arms(1.0, 0.0, 0.5, True, 0.0)  # arms that come in
 NONE = Arms(0.0, 0.0, np.nan, False, 0.0)
 
 
+@pytest.fixture(autouse=True)
+def alone(monkeypatch):
+    """One arm, no other beside it, and a room that stands: what a shot is asked is told below."""
+    monkeypatch.setattr(sight.Sight, "beside", lambda *what: 0.0)
+    monkeypatch.setattr(sight.Sight, "room", lambda *what: 0.0)
+
+
 def clip(n=6, height=90, width=160, start=0.0):
     frames = (np.arange(n * height * width * 3) % 251).astype(np.uint8)  # as many colours as a room
     return Clip(frames.reshape(n, height, width, 3), start + np.arange(n) / 20, [], [])
@@ -173,6 +180,7 @@ def test_patches_mend_what_a_detector_finds_in_each_shot_and_corners_refine_it(m
 
     monkeypatch.setattr(prepare, "mended", mended)
     monkeypatch.setattr(prepare, "gone", lambda found: 0.0)
+    monkeypatch.setattr(prepare, "of_hand", lambda found, side: False)
     monkeypatch.setattr(prepare, "refine", lambda seen, found, cuts: (cuts, seen is frames, found))
     model = SimpleNamespace(look=lambda seen: None, detect=detect)
     cuts, same, found = prepare.look(sight.shots(model, frames, [1]), frames, [1], True)
@@ -211,24 +219,29 @@ def test_the_surer_look_counts_and_for_a_hand_that_touches_nothing_the_one_at_wh
     monkeypatch.setattr(prepare, "mended", lambda frames, found: (found, True))
     monkeypatch.setattr(prepare.vanished, "followed", lambda thing, frames, found: found)
     monkeypatch.setattr(prepare, "gone", lambda found: 0.0)
+    monkeypatch.setattr(prepare, "of_hand", lambda found, side: False)
     found = prepare.looked(seen_by(detect, frames), touched)
     assert found.tip.tolist() == tip and found.object.tolist() == thing
     assert found.tip_sure[0] == (0.9 if touched else 0.54) and found.object_sure[0] == 0.9
 
 
 @pytest.mark.parametrize(
-    ("ways", "pushed", "touched", "object_"),
+    ("ways", "pushed", "hand", "touched", "object_"),
     [
-        ((5, 3, 4), (0, 0, 0), True, 0),
-        ((5, 5, 9), (1, 1, 1), True, 2),
-        ((5, 9, 5), (0, 0, 0), True, 1),
-        ((5, 9, 4), (0, 0, 1), True, 2),
-        ((5, 9, 9), (0, 1, 1), False, 0),
+        ((5, 3, 4), (0, 0, 0), "", True, 0),
+        ((5, 5, 9), (1, 1, 1), "", True, 2),
+        ((5, 9, 5), (0, 0, 0), "", True, 1),
+        ((5, 9, 4), (0, 0, 1), "", True, 2),
+        ((5, 9, 7), (1, 1, 1), "1", True, 2),
+        ((5, 9, 7), (0, 1, 0), "1", True, 1),
+        ((5, 9, 7), (1, 1, 1), "012", True, 1),
+        ((5, 9, 9), (0, 1, 1), "", False, 0),
     ],
-    ids=["the-surer", "at-what-moves", "at-all", "as-one-that-is-pushed", "nothing-is-touched"],
-)
+    ids=["the-surer", "at-what-moves", "at-all", "as-one-that-is-pushed", "no-piece-of-the-hand",
+         "the-only-one-that-is-pushed", "all-are-of-the-hand", "nothing-is-touched"],
+)  # fmt: skip
 def test_of_what_patches_make_of_the_looks_the_object_is_pushed_or_else_goes_farthest(
-    ways, pushed, touched, object_, monkeypatch
+    ways, pushed, hand, touched, object_, monkeypatch
 ):
     """The tip stays the surer look's. Patches are asked of it, of the whole look, of the other."""
     asked = []
@@ -244,6 +257,7 @@ def test_of_what_patches_make_of_the_looks_the_object_is_pushed_or_else_goes_far
     monkeypatch.setattr(prepare, "mended", mended)
     monkeypatch.setattr(prepare.vanished, "followed", lambda thing, frames, found: found)
     monkeypatch.setattr(prepare, "gone", lambda found: ways[found.object[0]])
+    monkeypatch.setattr(prepare, "of_hand", lambda found, side: str(found.object[0]) in hand)
     frames = np.zeros((5, 84, 84, 3), np.uint8)
     frames[:3, 40:50, 20:30] = frames[3:, 40:50, 50:60] = 200
     found = prepare.looked(seen_by(detect, frames), touched)
@@ -318,6 +332,7 @@ def test_the_shipped_detector_is_loaded_once_and_looks_once_at_a_frame_for_all_t
     monkeypatch.setattr(sight, "vanished", lambda frames: compared.append(len(frames)))
     monkeypatch.setattr(prepare, "mended", lambda frames, found: (found, True))
     monkeypatch.setattr(prepare, "gone", lambda found: 0.0)
+    monkeypatch.setattr(prepare, "of_hand", lambda found, side: False)
     monkeypatch.setattr(prepare.vanished, "followed", lambda thing, frames, found: found)
     monkeypatch.setattr(prepare.vanished, "check_seen", check_seen)
     scene = SimpleNamespace(contact=0.04)
@@ -465,8 +480,52 @@ def test_where_nothing_seems_to_move_an_arm_that_is_seen_does(arms, refused, mon
         with pytest.raises(Unusable, match=r"^nothing moves; film an arm\.$"):
             follow(result, marks)
         assert result.tracks is None
+        monkeypatch.setattr(sight, "vanished", lambda frames: "a thing has left its place")
+        with pytest.raises(Unusable, match=r"^no arm is seen, only something small moves; film"):
+            follow(result, marks)
     else:
         assert follow(result, marks) == "laid"
+
+
+@pytest.mark.parametrize(("share", "two"), [(0.09, False), (0.1, True)])
+def test_an_arm_that_moves_beside_the_one_with_the_tip_is_another_person(share, two, monkeypatch):
+    """The tip of the longest shot, frames 2 to 5, is asked about, as it was found."""
+    found = Found(np.arange(12.0).reshape(6, 2), np.zeros((6, 2)), np.arange(6) / 10, np.zeros(6))
+    asked, off = [], object()
+    monkeypatch.setattr(prepare, "look", lambda sights, frames, cuts, touched: found)
+    monkeypatch.setattr(prepare, "coming_in", lambda sight, off: ONE)
+    monkeypatch.setattr(sight.Sight, "beside", lambda self, *what: asked.append(what) or share)
+    monkeypatch.setattr(
+        prepare.footage, "check", lambda frames, cuts: Footage(frames, [], slice(2, 6), off, False)
+    )
+    monkeypatch.setattr(prepare, "lay", lambda tracks, scene, mirror: "laid")
+    result = prepared(clip=replace(clip(), cuts=[2]))
+    if two:
+        with pytest.raises(Unusable, match="as of several people"):
+            follow(result, Choices())
+    else:
+        assert follow(result, Choices()) == "laid"
+    (moved, tip, sure), = asked  # fmt: skip
+    assert moved is off and tip[0].tolist() == [4, 5] and sure.tolist() == [0.2, 0.3, 0.4, 0.5]
+
+
+@pytest.mark.parametrize(("share", "moves"), [(0.39, False), (0.4, True)])
+def test_a_room_that_moves_though_it_was_steadied_is_before_a_camera_that_does(
+    share, moves, monkeypatch
+):
+    nothing = Found(np.zeros((6, 2)), np.zeros((6, 2)), np.zeros(6), np.zeros(6))
+    asked, seen = [], Footage(np.zeros((6, 90, 160, 3)), [], slice(0, 6), None, False)
+    monkeypatch.setattr(prepare, "look", lambda sights, frames, cuts, touched: nothing)
+    monkeypatch.setattr(prepare, "coming_in", lambda sight, off: ONE)
+    monkeypatch.setattr(sight.Sight, "room", lambda self, what: asked.append(what) or share)
+    monkeypatch.setattr(prepare.footage, "check", lambda frames, cuts: seen)
+    monkeypatch.setattr(prepare, "lay", lambda tracks, scene, mirror: "laid")
+    if moves:
+        with pytest.raises(Unusable, match=r"^the camera moves; put it on a stand"):
+            follow(prepared(), Choices())
+    else:
+        assert follow(prepared(), Choices()) == "laid"
+    assert asked == [seen]
 
 
 @pytest.mark.parametrize("light", ["", " The picture is dark: more light would help."])

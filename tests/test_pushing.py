@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 
 from lbw_minimal.clips.paths import Tracks, Unusable
-from lbw_minimal.clips.pushing import check_apart, check_hand, check_steps, check_way, gets_faster
+from lbw_minimal.clips.pushing import (
+    check_apart,
+    check_hand,
+    check_steps,
+    check_view,
+    check_way,
+    gets_faster,
+)
 
 TOUCH, THERE, N = 20, 40, 50
 WAY = np.clip((np.arange(N) - TOUCH) / (THERE - TOUCH), 0, 1)
@@ -198,3 +205,43 @@ def test_what_leaps_three_fifths_of_its_way_may_be_two_things(leap, back, two):
             check_steps(seen, start, end)
     else:
         check_steps(seen, start, end)
+
+
+def viewed(hand, thing=0.0, sure=1.0, unseen=()):
+    """`check_view` of a hand that goes by `hand` pixels and back, in a picture of 100, and a thing
+    that goes by so many, surely found in that share of 20 frames; unseen: frames without the hand.
+    """
+    there = np.concatenate([np.linspace(0, 1, 10), np.linspace(1, 0, 10)])[:, None]
+    found, tip_found = (np.arange(20) < 20 * sure).astype(float), np.ones(20)
+    tip_found[list(unseen)] = 0.4
+    places = there * np.array(hand, float), there * (0.0, thing)
+    check_view(Tracks(np.zeros(0), *places, tip_found, found, 100))
+
+
+@pytest.mark.parametrize(
+    ("hand", "steep"),
+    [((0, 31), True), ((0, -31), True), ((0, 29), False), ((20, 31), True), ((-21, 31), False)],
+)
+def test_a_hand_that_goes_far_and_steeply_where_nothing_moves_is_not_seen_from_the_side(
+    hand, steep
+):
+    if steep:
+        with pytest.raises(Unusable, match=f"^the hand goes 31 pixels up or down and {hand[0]} "):
+            viewed(hand)
+    else:
+        viewed(hand)
+
+
+def test_how_the_hand_goes_is_not_asked_where_a_thing_is_seen_to_move():
+    viewed((0, 50), thing=7)
+    viewed((0, 50), thing=7, sure=0.5)
+    for seen in (dict(thing=5), dict(thing=7, sure=0.45), dict(thing=50, sure=0)):
+        with pytest.raises(Unusable, match="lift nothing, and film from the side"):
+            viewed((0, 50), **seen)
+
+
+def test_a_tip_that_leaps_is_no_hand_that_goes_steeply():
+    """From a third of its way to all of it, which is 0.67, or from four ninths, 0.56."""
+    viewed((0, 50), unseen=range(4, 9))
+    with pytest.raises(Unusable, match="the hand goes 50 pixels"):
+        viewed((0, 50), unseen=range(5, 9))

@@ -8,6 +8,7 @@ import pytest
 
 from lbw_minimal.clips import vanished
 from lbw_minimal.clips.detector import Found
+from lbw_minimal.clips.patches import Path, of_hand
 from lbw_minimal.clips.paths import Unusable
 
 N, LEAVES, THERE = 48, 12, 24  # frames: in all, and between which the thing moves
@@ -233,3 +234,25 @@ def test_an_object_that_stays_elsewhere_is_not_what_the_hand_takes():
     along = np.interp(np.arange(N), [LEAVES, N - 1], [62, 160])
     goes = replace(stays, tip=np.stack([along, np.full(N, 77)], 1))
     assert followed(lifted, goes) is goes  # as soon as the hand: it is a piece of that
+
+
+def test_what_stays_as_far_from_the_tip_and_comes_down_with_it_is_a_piece_of_the_hand():
+    """It goes down by half of its way across; by how much of its way the hand comes nearer."""
+    down = 0.5 * (WAY - WAY[0])
+    for nearer, hand in ((0, True), (0.2, True), (0.3, False), (1, False)):
+        comes = np.interp(np.arange(N), [0, THERE], [1, 0])
+        apart = comes * nearer * np.hypot(np.ptp(WAY), np.ptp(down))
+        places = np.stack([WAY + 7.0, 40 + down], 1)
+        tip = places - np.stack([12 + apart, 0 * apart], 1)
+        path = Path(places, np.ones(N), tip, 120)
+        assert path.of_hand == hand
+        assert of_hand(Found(tip, places, np.ones(N), np.ones(N)), 120) == hand
+    assert not replace(path, tip=None).of_hand
+
+
+def test_a_piece_of_the_hand_that_has_left_its_place_is_not_followed(monkeypatch):
+    off = found(WAY + 13.0)
+    assert followed(film(), off) is not off
+    monkeypatch.setattr(vanished, "Path", lambda *what: replace(Path(*what), tip=None))
+    monkeypatch.setattr(Path, "of_hand", True)
+    assert followed(film(), off) is off

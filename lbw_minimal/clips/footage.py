@@ -28,6 +28,8 @@ EDGE = 3  # pixels from the picture's edge, over which an arm comes in
 SPECK = 0.0015  # of the picture, 10 pixels in one piece: noise moves a few, each by itself
 SOMETIMES = 2  # frames in which something moves: noise does so in one
 ENDS = 16  # a clip's first and last frames are so many of it
+CAMERA = "the camera moves", "put it on a stand or lean it against something, and film again"
+ONLY_SMALL = "no arm is seen, only something small moves", SIDE_ON
 
 
 class Footage(NamedTuple):
@@ -72,7 +74,7 @@ def check(frames: np.ndarray, cuts: Sequence[int] = ()) -> Footage:
 def _still(moves):
     """Why nothing large is among what moves (T, 84, 84), and the remedy."""
     if _speck(moves):
-        return "no arm is seen, only something small moves", SIDE_ON
+        return ONLY_SMALL
     said = "nothing moves in the clip, as far as is seen"
     return said, "record from before the hand comes in until all is done"
 
@@ -82,9 +84,7 @@ def _steadied(frames, shots, longest):
     sways = [camera.sway(frames[first:last]) for first, last in shots]
     way = camera.extent(sways[longest], *frames.shape[1:3])
     if way > MOVES:
-        raise Unusable(
-            "the camera moves", "put it on a stand or lean it against something, and film again"
-        )
+        raise Unusable(*CAMERA)
     if way <= TREMBLES:
         return frames, []
     steady = [camera.steadied(frames[a:b], s) for (a, b), s in zip(shots, sways, strict=True)]

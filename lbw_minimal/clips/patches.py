@@ -18,6 +18,7 @@ import numpy as np
 
 from lbw_minimal.clips.detector import SURE, Found
 from lbw_minimal.clips.paths import FOUND, extent, median3
+from lbw_minimal.clips.pushing import is_hand
 
 SMALL = 160  # pixels, the longer side of the frames in which patches are looked for
 LOOK_AT = 48  # frames of a shot that are looked at, spread over it
@@ -83,6 +84,15 @@ class Path:
         return float(steps[: self.start].sum() / max(steps.sum(), 1e-6))
 
     @property
+    def of_hand(self) -> bool:
+        """Whether it is told to be the hand when it is laid into the scene, see `is_hand`."""
+        if self.tip is None:
+            return False
+        far = int(np.linalg.norm(self.places - self.places[0], axis=1).argmax())
+        along = self.places[far] - self.places[0]
+        return is_hand(median3(self.tip - self.places)[: far + 1], along, self.side)
+
+    @property
     def pushed(self) -> bool:
         """Whether it moves as an object does: not with the hand from the start, not to and fro, not
         in leaps, and by a hand that is near."""
@@ -139,6 +149,13 @@ def mended(frames: np.ndarray, found: Found) -> tuple[Found, bool]:
     # A patch that is just alike is just sure.
     sure = np.interp(along, k, np.clip(1 + (best.alike - 1) / 0.8, 0, 1))
     return replace(found, object=np.stack(places, 1), object_sure=sure), best.pushed
+
+
+def of_hand(found: Found, side: int) -> bool:
+    """Whether the object that was found is a piece of the hand, see `Path.of_hand`. side: the
+    frames' shorter one, in pixels."""
+    tip = tip_at(found, np.arange(len(found.object)), 1.0)
+    return Path(found.object, found.object_sure, tip, side).of_hand
 
 
 def gone(found: Found) -> float:

@@ -8,7 +8,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from lbw_minimal.clips.paths import RESTS, SIDE_ON, SURE, Tracks, Unusable, interpolate
+from lbw_minimal.clips.paths import (
+    FOUND,
+    LEAST_WAY,
+    RESTS,
+    SIDE_ON,
+    SURE,
+    Tracks,
+    Unusable,
+    extent,
+    interpolate,
+    median3,
+)
 
 LIFTED = 0.2  # of its way: what leaves the straight line by more was picked up
 AHEAD = 0.25  # of its way: a tip so far in front of the object does not push it
@@ -27,6 +38,13 @@ AT_HAND = 0.1
 # Of its way, between two frames in turn in which it is surely seen: a thing that is pushed goes by
 # at most 0.48, and a dot that jumps from one hand to the other by 0.7 to 1.
 LEAP = 0.6
+# Of the picture's shorter side: of made hands that go steeply where nothing moves, 0.24 at most; of
+# those that push in front of the camera, or behind it, 0.39 or more.
+LONG = 0.3
+# Height over width of the way of a hand that touches nothing, which may come down to its mark.
+# Hands seen from the side had up to 1.1, but for one; made ones from the front or from straight
+# above had 2.6 and more.
+STEEP_HAND = 1.5
 STRIDE = 4  # steps, over which a speed is taken
 FASTEST = 0.95  # of the highest speed: the rest is noise
 
@@ -71,21 +89,52 @@ def check_way(
         )
 
 
+def check_view(tracks: Tracks) -> None:
+    """Raise Unusable where no object is seen to move, and the hand goes a long way up or down the
+    picture: then it takes the object along in front of the camera or behind it, or lifts it. A tip
+    that leaps is no hand that goes."""
+    sure = tracks.object_sure >= SURE
+    if sure.mean() >= FOUND and extent(tracks.object[sure]) >= LEAST_WAY * tracks.side:
+        return
+    tip = median3(tracks.tip[tracks.tip_sure >= SURE])
+    far = tip[np.linalg.norm(tip - tip[0], axis=1).argmax()] - tip[0]
+    leap = np.linalg.norm(np.diff(tip, axis=0), axis=1).max(initial=0)
+    long = max(LONG * tracks.side, STEEP_HAND * abs(far[0]))
+    if abs(far[1]) > long and leap < LEAP * np.linalg.norm(far):
+        raise steep("the hand", far, touched=True)
+
+
+def steep(what: str, way: np.ndarray, touched: bool) -> Unusable:
+    """The error for a way (2,) pixels of the hand or the object, `what`, that is not one across the
+    picture."""
+    return Unusable(
+        f"{what} goes {abs(way[1]):.0f} pixels up or down and {abs(way[0]):.0f} across",
+        "lift nothing, and " * touched
+        + "film from the side, at the height of the table, so that it goes across the picture",
+    )
+
+
 def check_apart(apart: np.ndarray, along: np.ndarray, side: int) -> None:
     """Raise Unusable where the object goes with the hand from the start, and comes down with it.
 
     apart (n, 2) pixels: from the object to the tip, until the object is there; along (2,): its way;
     side: of the picture, the shorter one.
     """
-    length = np.linalg.norm(along)
-    glued = np.linalg.norm(np.ptp(apart, axis=0)) < GLUED * length
-    at_hand = np.linalg.norm(apart, axis=1).max() < AT_HAND * side and along[1] > abs(along[0])
-    if (glued or at_hand) and along[1] > COMES_DOWN * length:
+    if is_hand(apart, along, side):
         raise Unusable(
             "the object never moves: what goes with the hand from the start, and comes down with "
             "it, is the hand",
             "film the task being done, with an object that is seen before the hand gets to it",
         )
+
+
+def is_hand(apart: np.ndarray, along: np.ndarray, side: int) -> bool:
+    """Whether what goes along (2,), apart (n, 2) pixels from the tip, is a piece of the hand: it
+    stays so far from the tip, or near it, and comes down."""
+    length = np.linalg.norm(along)
+    glued = np.linalg.norm(np.ptp(apart, axis=0)) < GLUED * length
+    at_hand = np.linalg.norm(apart, axis=1).max() < AT_HAND * side and along[1] > abs(along[0])
+    return bool((glued or at_hand) and along[1] > COMES_DOWN * length)
 
 
 def check_hand(tracks: Tracks, t: np.ndarray, thing: np.ndarray, along: np.ndarray) -> None:

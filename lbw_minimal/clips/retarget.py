@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from lbw_minimal.clips import pushing
 from lbw_minimal.clips.lifting import check_lifted
 from lbw_minimal.clips.paths import (
     FOUND,
@@ -34,7 +35,6 @@ from lbw_minimal.clips.paths import (
     trusted,
     unsure,
 )
-from lbw_minimal.clips.pushing import check_apart, check_hand, check_steps, check_way, gets_faster
 from lbw_minimal.clips.used import left_out, sliver
 
 FPS = 25  # steps a second of the motion, as in the tasks
@@ -47,9 +47,6 @@ RUN_UP = 2.0  # s before a hit that are kept
 LITTLE = 0.1
 LONGEST = 12.0  # s, the longest horizon of the tasks; only a hit cannot be hurried
 STEEP = 1.0  # height over width of the way; steeper, and it is not seen from the side
-# The same of a hand that touches nothing, which may come down to its mark. Hands seen from the side
-# had up to 1.1, but for one; made ones from the front or from straight above had 2.6 and more.
-STEEP_HAND = 1.5
 CARRIED = 0.85  # of its way: a hand that goes along so far has not hit
 STEEPEST = 0.5  # height over way, by which a hit comes down to its object
 OUTSIDE = 0.02  # m out of the tip's box; until then the approach stands in for the clip
@@ -105,6 +102,7 @@ def lay(tracks: Tracks, scene: Scene, mirror: bool | None = None) -> Motion:
     tip = thing = low_pass(*trusted(tracks, "tip"), t)  # (N, 2) pixels
     if touched:
         check_lifted(tracks)
+        pushing.check_view(tracks)
         s, seen = trusted(tracks, "object")
         thing = low_pass(s, seen, t)
     else:
@@ -112,7 +110,7 @@ def lay(tracks: Tracks, scene: Scene, mirror: bool | None = None) -> Motion:
     what, least = ("object", STANDS) if touched else ("hand", LITTLE)
     start, end = ends(thing, least * tracks.side, what)
     gone = float(np.linalg.norm(end - start))
-    if gets_faster(thing):
+    if pushing.gets_faster(thing):
         if gone < LITTLE * tracks.side:
             raise Unusable(
                 f"the clip ends {gone:.0f} pixels on its way, while the {what} still gets faster",
@@ -128,14 +126,14 @@ def lay(tracks: Tracks, scene: Scene, mirror: bool | None = None) -> Motion:
     way = progress(thing, start, end)  # (N,) from 0 to 1
     i, j = (int(np.argmax(way >= share)) for share in (CONTACT if touched else ARRIVED, ARRIVED))
     if touched:
-        check_apart((tip - thing)[: j + 1], end - start, tracks.side)
+        pushing.check_apart((tip - thing)[: j + 1], end - start, tracks.side)
     A = fit(start, end, scene, mirror)
     x = apply(A, tip)  # (N, 2) m
     if touched:
-        check_way(tracks, tip, thing, way, (i, j), (start, end))
-        check_hand(tracks, t[i : j + 1], thing[i : j + 1], end - start)
+        pushing.check_way(tracks, tip, thing, way, (i, j), (start, end))
+        pushing.check_hand(tracks, t[i : j + 1], thing[i : j + 1], end - start)
         if not scene.hit:  # a hit thing may go far while it is a blur
-            check_steps(seen, start, end)
+            pushing.check_steps(seen, start, end)
         x, object_ = _push(x, way, scene, warnings)
     else:
         object_ = None
@@ -161,12 +159,8 @@ def fit(start: np.ndarray, end: np.ndarray, scene: Scene, mirror: bool) -> np.nd
     Raises Unusable where the way is not one across the picture, or goes backwards.
     """
     (dx, dy), sign, touched = end - start, -1 if mirror else 1, scene.contact is not None
-    if abs(dy) > (STEEP if touched else STEEP_HAND) * abs(dx):
-        raise Unusable(
-            f"it goes {abs(dy):.0f} pixels up or down and {abs(dx):.0f} across",
-            "lift nothing, and " * touched
-            + "film from the side, at the height of the table, so that it goes across the picture",
-        )
+    if abs(dy) > (STEEP if touched else pushing.STEEP_HAND) * abs(dx):
+        raise pushing.steep("it", end - start, touched)
     if sign * dx < 0:
         raise Unusable(
             "it goes to the left in the picture, once mirrored or not as was asked",

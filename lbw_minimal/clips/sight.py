@@ -11,8 +11,10 @@ from itertools import pairwise
 
 import numpy as np
 
+from lbw_minimal.clips import arms
 from lbw_minimal.clips.detector import Detector, Look
-from lbw_minimal.clips.motion import told
+from lbw_minimal.clips.footage import Footage
+from lbw_minimal.clips.motion import some, told
 from lbw_minimal.clips.vanished import Vanished, vanished
 
 
@@ -47,3 +49,15 @@ class Sight:
     def vanished(self) -> Vanished | None:
         """What has left its place by the end."""
         return vanished(self.frames)
+
+    def room(self, seen: Footage) -> float:
+        """By how much the room moves though it was steadied, see `arms.room`; 0 if it was not."""
+        return arms.room(some(self.whole.arms), seen.off) if seen.warnings else 0.0
+
+    def beside(self, off: np.ndarray, tip: np.ndarray, sure: np.ndarray) -> float:
+        """The share of the frames in which an arm moves beside another, see `arms.beside`.
+
+        off: as in `Footage`; tip (T, 2) pixels, sure (T,).
+        """
+        tip = tip / self.frames.shape[2:0:-1]
+        return arms.beside(some(self.whole.arms), off, some(tip), some(sure))

@@ -159,7 +159,7 @@ def followed(thing: Vanished | None, frames: np.ndarray, found: Found) -> Found:
     its place as the object's where that is another one, and that of a thing that is pushed; or
     where the object stays there: then it was seen as it stood, and not as it left; or where the
     object stays elsewhere, and the hand was at the thing as it left: who takes one thing moves no
-    other."""
+    other. A piece of the hand is no thing."""
     alike = np.median(thing.alike[thing.left :]) if thing else 0
     if thing is None or alike < ALIKE:
         return found
@@ -172,7 +172,7 @@ def followed(thing: Vanished | None, frames: np.ndarray, found: Found) -> Found:
     taken = path.alone >= ALONE and _at(path.tip, thing)  # a piece of the hand does not wait
     still = extent(found.object[k][sure]) < LEAST_WAY * min(frames.shape[1:3])
     stays = still and (near[0] or taken)
-    if not goes and not stays:
+    if path.of_hand or not (goes or stays):
         return found
     along = np.arange(n)
     places = [np.interp(along, k, thing.places[:, axis] / scale) for axis in (0, 1)]

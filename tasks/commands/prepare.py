@@ -27,7 +27,7 @@ from lbw_minimal.clips.hiding import unlike
 from lbw_minimal.clips.motion import small, some
 from lbw_minimal.clips.outline import reaching
 from lbw_minimal.clips.page import clip_column, write_page
-from lbw_minimal.clips.patches import gone, mended
+from lbw_minimal.clips.patches import gone, mended, of_hand
 from lbw_minimal.clips.paths import Tracks, Unusable, jumps
 from lbw_minimal.clips.reader import Clip, read_clip
 from lbw_minimal.clips.retarget import FPS, Motion, Scene, lay
@@ -194,7 +194,7 @@ def follow(result: Prepared, choices: Choices) -> Motion:
     longest = sights[[0, *clip.cuts].index(seen.shot.start)]
     arm = coming_in(longest, seen.off)
     if seen.still and arm.seen < arms.SEEN:
-        raise Unusable(*seen.still)
+        raise Unusable(*(footage.ONLY_SMALL if longest.vanished else seen.still))
     found = look(sights, frames, clip.cuts, result.scene.contact is not None)
     result.light = partial(light.poor, frames[seen.shot], found.tip_sure[seen.shot])
     tracks = Tracks(
@@ -204,9 +204,10 @@ def follow(result: Prepared, choices: Choices) -> Motion:
     tracks = tracks.marked("tip", list(choices.tip)).marked("object", list(choices.object))
     result.tracks, result.notes = tracks, result.notes + [choices.placed] * bool(choices.placed)
     unplaced = result.scene.contact is not None and not choices.object
+    hand = tracks.tip[seen.shot], tracks.tip_sure[seen.shot]
     if unplaced:  # before arms are counted: one that is before a thing reaches far into the picture
-        hand = tracks.tip[seen.shot], tracks.tip_sure[seen.shot]
         vanished.check_seen(longest.vanished, *hand)
+    arm = arm._replace(beside=longest.beside(seen.off, *hand), room=longest.room(seen))
     if arm.doubt:
         if not choices.tip:
             raise Unusable(*arm.doubt)
@@ -247,7 +248,7 @@ def looked(sight: Sight, touched: bool) -> Found:
     object are each told by the look that is surer of it. Where nothing is touched a hand rests
     longest, at its mark, and the look at what moves tells it, or its outline. Patches take the
     object from the tip's way: beside a wrong tip they find what rests. So they ask each look, and
-    what moves as an object does, or else goes farthest, is the object.
+    what moves as an object does, and is no piece of the hand, or else goes farthest, is the object.
     """
     frames, model = sight.frames, sight.model
     whole, moves = model.detect(frames, sight.whole), model.detect(frames[sight.told], sight.moving)
@@ -261,7 +262,8 @@ def looked(sight: Sight, touched: bool) -> Found:
     looks = [surer]
     if touched:  # the one that is surer of both is asked already
         looks += [one for one in (whole, moving) if not (one is hand and one is thing)]
-    thing, _ = max((mended(frames, one) for one in looks), key=lambda m: (m[1], gone(m[0])))
+    asked, side = [mended(frames, one) for one in looks], min(frames.shape[1:3])
+    thing, _ = max(asked, key=lambda m: (m[1], not of_hand(m[0], side), gone(m[0])))
     found = Found(hand.tip, thing.object, hand.tip_sure, thing.object_sure)
     return vanished.followed(sight.vanished, frames, found) if touched else found
 
