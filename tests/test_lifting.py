@@ -101,4 +101,4 @@ def test_a_clip_of_a_lifted_thing_is_told_so_where_something_at_rest_was_taken_f
     with pytest.raises(Unusable, match="as one that lifts"):
         lay(tracks(lifts(0.4)), SCENE)
     with pytest.raises(Unusable, match="never moves"):
-        lay(tracks(path(*COMES, COMES[0])), SCENE)
+        lay(tracks(path((20, 80), COMES[1], (20, 80))), SCENE)

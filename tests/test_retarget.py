@@ -428,6 +428,53 @@ def test_a_clip_that_cannot_be_laid_is_refused_with_the_reason_and_a_remedy(faul
     assert str(error.value).count("; ") == 1 and str(error.value).endswith(".")
 
 
+def hand_in_hand():
+    """The hand is at the object from the first picture on, and both come down in the picture."""
+    tracks = clip()
+    slope = tracks.object + np.stack(
+        [0 * tracks.times, 0.4 * (tracks.object[:, 0] - tracks.object[0, 0])], 1
+    )
+    return replace(tracks, tip=slope - (20, 0), object=slope), "is the hand"
+
+
+def a_hand_that_goes_up():
+    """And what was taken for the object lies still."""
+    tracks = nothing_is_pushed()[0]
+    up = 300 * np.clip(tracks.times / tracks.times[-1], 0, 1)
+    return replace(tracks, tip=tracks.tip * (0.1, 1) - np.stack([0 * up, up], 1)), "as one that"
+
+
+def marked(tracks, truth, *names):
+    """The tracks with the places of tip or object in `truth` as the user's marks."""
+    for name in names:
+        path = getattr(truth, name)
+        tracks = tracks.marked(name, [(*path[i], truth.times[i]) for i in range(0, 78, 4)])
+    return tracks
+
+
+def test_what_the_user_placed_as_the_object_is_not_the_hand():
+    tracks, reason = hand_in_hand()
+    with pytest.raises(Unusable, match=reason):
+        lay(tracks, SCENE)
+    lay(marked(tracks, tracks, "object"), SCENE)
+
+
+def test_what_the_user_placed_as_the_object_lies_still_however_the_hand_goes():
+    tracks, reason = a_hand_that_goes_up()
+    with pytest.raises(Unusable, match=reason):
+        lay(tracks, SCENE)
+    still = marked(tracks, tracks, "object")
+    with pytest.raises(Unusable, match="never moves"):
+        lay(still, SCENE)
+
+
+def test_an_arm_may_come_in_ahead_of_a_hand_that_the_user_placed():
+    tracks, reason = hooked()
+    lay(marked(tracks, tracks, "tip"), SCENE)
+    with pytest.raises(Unusable, match=reason):
+        lay(marked(tracks, tracks, "object"), SCENE)
+
+
 @pytest.mark.parametrize(
     ("enters", "mirror"), [(0.2, False), (0.8, True), (0.5, False), (0.5, True), (np.nan, False)]
 )

@@ -63,11 +63,12 @@ def check_way(
     much of its way the object has gone, 0 to 1; steps: when it is touched, and there; ends: where
     its way begins and ends.
     """
-    (i, j), (start, end) = steps, ends
+    (i, j), (start, end), yours = steps, ends, {what for what, *_ in tracks.yours}
     along = end - start
     length = np.linalg.norm(along)
     door = (tracks.enters * tracks.width - tip[i, 0]) * np.sign(along[0])  # nan: no arm was seen
-    if tracks.width and door > PULLS * tracks.width:
+    # A hand may hook a thing, so its tip says little; one that the user placed pushes from there.
+    if tracks.width and "tip" not in yours and door > PULLS * tracks.width:
         raise Unusable(
             "the object comes towards the arm, which so pulls it",
             "push it away from the arm, with one hand, which is behind it",

@@ -93,7 +93,7 @@ def lay(tracks: Tracks, scene: Scene, mirror: bool | None = None) -> Motion:
 
     Raises Unusable if the clip does not show the task, or not so that it can be laid there.
     """
-    notes, warnings = list[str](), list[str]()
+    notes, warnings, yours = list[str](), list[str](), {what for what, *_ in tracks.yours}
     touched = scene.contact is not None
     if not touched:
         tracks = of_a_hand(tracks, notes)
@@ -101,8 +101,9 @@ def lay(tracks: Tracks, scene: Scene, mirror: bool | None = None) -> Motion:
     t = np.arange(tracks.times[0], tracks.times[-1] + 1e-9, 1 / FPS)
     tip = thing = low_pass(*trusted(tracks, "tip"), t)  # (N, 2) pixels
     if touched:
-        check_lifted(tracks)
-        pushing.check_view(tracks)
+        if "object" not in yours:  # what was taken for it may be something else
+            check_lifted(tracks)
+            pushing.check_view(tracks)
         s, seen = trusted(tracks, "object")
         thing = low_pass(s, seen, t)
     else:
@@ -125,7 +126,7 @@ def lay(tracks: Tracks, scene: Scene, mirror: bool | None = None) -> Motion:
             notes.append("It goes to the left in the clip, and was mirrored.")
     way = progress(thing, start, end)  # (N,) from 0 to 1
     i, j = (int(np.argmax(way >= share)) for share in (CONTACT if touched else ARRIVED, ARRIVED))
-    if touched:
+    if touched and "object" not in yours:
         pushing.check_apart((tip - thing)[: j + 1], end - start, tracks.side)
     A = fit(start, end, scene, mirror)
     x = apply(A, tip)  # (N, 2) m
