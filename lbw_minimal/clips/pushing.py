@@ -108,10 +108,11 @@ def check_view(tracks: Tracks) -> None:
 def steep(what: str, way: np.ndarray, touched: bool) -> Unusable:
     """The error for a way (2,) pixels of the hand or the object, `what`, that is not one across the
     picture."""
+    do = "lift nothing" if touched else "let the hand go more across than up or down"
     return Unusable(
         f"{what} goes {abs(way[1]):.0f} pixels up or down and {abs(way[0]):.0f} across",
-        "lift nothing, and " * touched
-        + "film from the side, at the height of the table, so that it goes across the picture",
+        f"{do}, and film from the side, at the height of the table, so that it goes across the "
+        "picture",
     )
 
 
