@@ -1,5 +1,7 @@
 """How many arms come into a clip, and where: by masks drawn by hand and by the detector's."""
 
+from types import SimpleNamespace
+
 import cv2
 import numpy as np
 import pytest
@@ -7,7 +9,9 @@ from toy_clips import arm, room
 
 from lbw_minimal.clips import arms
 from lbw_minimal.clips.detector import Detector
+from lbw_minimal.clips.footage import Footage
 from lbw_minimal.clips.motion import some
+from lbw_minimal.clips.sight import Sight
 from tasks.commands.prepare import EYES
 
 H, W = 32, 42  # cells
@@ -323,6 +327,21 @@ def test_what_is_near_an_arm_is_not_asked():
 def test_two_arms_that_are_seen_and_none_are_told_before_a_room_that_moves(several, seen, said):
     found = arms.Arms(seen, several, 0.5, False, 1.0, room=0.4)
     assert found.doubt[0].startswith(said) and found._replace(room=0.39).doubt[0][:3] != "the"
+
+
+def test_a_shot_is_asked_by_its_pixels_and_its_room_only_if_it_was_steadied():
+    """Sixty of a hundred frames, 420 wide and 160 high: a cell is 10 by 5 pixels."""
+    shown = np.stack([mask(FIRST, SECOND)] * 100)
+    sight = Sight(
+        SimpleNamespace(look=lambda frames: SimpleNamespace(arms=shown)),
+        np.zeros((100, 160, 420, 3), np.uint8),
+    )
+    off = np.full((60, 84, 84), 17.0)
+    assert sight.beside(off, np.array([(60.0, 55.0)] * 100), np.ones(100)) == 1
+    assert sight.beside(off, np.array([(60.0, 75.0)] * 100), np.ones(100)) == 0
+    steadied = Footage(sight.frames, ["It trembles."], slice(0, 100), off, True)
+    assert sight.room(steadied) == arms.room(shown[:60], off) > 0
+    assert sight.room(steadied._replace(warnings=[])) == 0
 
 
 # As the shipped detector sees them
