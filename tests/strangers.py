@@ -28,7 +28,7 @@ FAULTS = {
     "still": "nothing moves", "pan": "the camera moves", "zoom": "the camera moves",
     "carried about": "the camera moves", "no arm": "no arm", "two people": "several people",
     "never moves": "never moves", "hidden": "hid", "short": "too few", "pulled": "pull|towards",
-    "lifted": "straight way|up or down", "steep": "up or down",
+    "lifted": "straight way|up or down", "steep": "up or down",  # a steep reach is usable
 }  # fmt: skip
 TASKS = ("reach", "push", "slide", "coffee", "drawer")
 USABLE = 0.55  # share of the clips
@@ -56,13 +56,19 @@ class Stranger:
     codec: int = 0
 
     @property
+    def usable(self) -> bool:
+        """Whether it shows its task. A hand that reaches may come from straight above: two persons
+        who judged films of others by README alone call such films usable."""
+        return self.kind == "usable" or (self.kind == "steep" and self.task == "reach")
+
+    @property
     def reason(self) -> str:
         """A pattern of the reason for which it is not usable; "" if it is usable."""
         if self.kind in ("pulled", "hidden") and self.task == "slide":
             return FAULTS[self.kind] + "|goes along"  # the hand does so, and a slide is a hit
         if self.kind == "no arm" and self.task == "reach":
             return FAULTS["still"] + "|no arm"  # a lamp may swing, and nothing else
-        return FAULTS.get(self.kind, "")
+        return "" if self.usable else FAULTS[self.kind]
 
     def write(self, folder: Path) -> Path:
         """The clip as a file."""
@@ -140,8 +146,8 @@ def stranger(seed: int, i: int, made: str = "either") -> Stranger:
 def judged(one: Stranger, verdict: str) -> bool:
     """Whether a verdict is right: usable or not, and why not."""
     if verdict.startswith("usable"):
-        return one.kind == "usable"
-    return one.kind != "usable" and bool(re.search(one.reason, verdict))
+        return one.usable
+    return not one.usable and bool(re.search(one.reason, verdict))
 
 
 def trial(seed: int, count: int, made: str = "either", show=print) -> list[tuple[Stranger, str]]:

@@ -56,6 +56,14 @@ def test_a_verdict_is_right_if_its_reason_is():
     assert still.kind in FAULTS
 
 
+@pytest.mark.parametrize(("task", "usable"), [("reach", True), ("push", False), ("slide", False)])
+def test_a_steep_way_is_that_of_a_reach_alone(task, usable):
+    none = np.zeros((0, 2))
+    one = Stranger("steep", task, "painted", np.zeros((0, 8, 8, 3), np.uint8), 10, none, none)
+    assert one.usable == usable == judged(one, "usable, with a warning")
+    assert judged(one, "not usable: it goes 90 pixels up or down and 10 across") != usable
+
+
 @pytest.mark.parametrize("kind", ["pulled", "hidden"])
 def test_of_a_puck_with_which_the_hand_goes_along_that_is_a_right_reason(kind):
     nothing = np.zeros((1, 2))

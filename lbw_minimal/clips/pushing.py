@@ -41,9 +41,8 @@ LEAP = 0.6
 # Of the picture's shorter side: of made hands that go steeply where nothing moves, 0.24 at most; of
 # those that push in front of the camera, or behind it, 0.39 or more.
 LONG = 0.3
-# Height over width of the way of a hand that touches nothing, which may come down to its mark.
-# Hands seen from the side had up to 1.1, but for one; made ones from the front or from straight
-# above had 2.6 and more.
+# Height over width of such a way. Hands seen from the side had up to 1.1, but for one; made ones
+# from the front or from straight above had 2.6 and more.
 STEEP_HAND = 1.5
 STRIDE = 4  # steps, over which a speed is taken
 FASTEST = 0.95  # of the highest speed: the rest is noise
@@ -102,17 +101,16 @@ def check_view(tracks: Tracks) -> None:
     leap = np.linalg.norm(np.diff(tip, axis=0), axis=1).max(initial=0)
     long = max(LONG * tracks.side, STEEP_HAND * abs(far[0]))
     if abs(far[1]) > long and leap < LEAP * np.linalg.norm(far):
-        raise steep("the hand", far, touched=True)
+        raise steep("the hand", far)
 
 
-def steep(what: str, way: np.ndarray, touched: bool) -> Unusable:
+def steep(what: str, way: np.ndarray) -> Unusable:
     """The error for a way (2,) pixels of the hand or the object, `what`, that is not one across the
     picture."""
-    do = "lift nothing" if touched else "let the hand go more across than up or down"
     return Unusable(
         f"{what} goes {abs(way[1]):.0f} pixels up or down and {abs(way[0]):.0f} across",
-        f"{do}, and film from the side, at the height of the table, so that it goes across the "
-        "picture",
+        "lift nothing, and film from the side, at the height of the table, so that it goes across "
+        "the picture",
     )
 
 

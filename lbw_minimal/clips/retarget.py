@@ -155,12 +155,13 @@ def fit(start: np.ndarray, end: np.ndarray, scene: Scene, mirror: bool) -> np.nd
 
     Widths and heights are scaled alike. A way that rises or falls in the picture, because the
     camera turns aside or is not level, is laid down by a shear, which leaves upright what is. The
-    way of a hand that touches nothing is turned: nothing in it has to stay upright.
-    Raises Unusable where the way is not one across the picture, or goes backwards.
+    way of a hand that touches nothing is turned, however it goes: nothing in it has to stay
+    upright.
+    Raises Unusable where an object's way is not one across the picture, or a way goes backwards.
     """
     (dx, dy), sign, touched = end - start, -1 if mirror else 1, scene.contact is not None
-    if abs(dy) > (STEEP if touched else pushing.STEEP_HAND) * abs(dx):
-        raise pushing.steep("it", end - start, touched)
+    if touched and abs(dy) > STEEP * abs(dx):
+        raise pushing.steep("it", end - start)
     if sign * dx < 0:
         raise Unusable(
             "it goes to the left in the picture, once mirrored or not as was asked",
