@@ -1,5 +1,6 @@
 """What moves is rendered in a window of the picture: none of it is outside, and it looks alike."""
 
+import cv2
 import numpy as np
 import pybullet
 import pytest
@@ -118,6 +119,17 @@ def test_a_mesh_that_is_gone_is_known_by_its_text(world, tmp_path):
     world.shapes.add(body, {"gone.obj": WEDGE})
     lost, kept = outside(world)
     assert lost == 0 < kept < 0.5 * 168**2
+
+
+def test_a_body_of_which_a_mesh_cannot_be_read_is_seen_anywhere(world, tmp_path):
+    """As an arm of one's own may have: the renderer reads more than the kit does."""
+    path = tmp_path / "gone.obj"
+    path.write_text(WEDGE)
+    body = shape(world.p, pybullet.GEOM_MESH, fileName=str(path), meshScale=(0.02, 0.03, 0.05))
+    path.unlink()
+    world.shapes.add(body)
+    assert world._window() == WHOLE
+    assert (world.render() != cv2.resize(world.backdrop, (84, 84))).any()
 
 
 def test_a_body_that_the_world_did_not_add_is_seen_anywhere(world):

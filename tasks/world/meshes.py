@@ -1,4 +1,4 @@
-"""Triangles for the viewer: read from files, drawn with round surfaces round and edges sharp."""
+"""Triangles of mesh files, and the normals with which round surfaces look round, edges sharp."""
 
 from __future__ import annotations
 

@@ -8,6 +8,7 @@ a PyBullet that was built without NumPy makes six Python numbers of each pixel t
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from functools import cache
 from typing import NamedTuple
 
@@ -56,13 +57,14 @@ class Shapes:
     def add(self, body: int, meshes: dict[str, str] | None = None) -> None:
         """Learn a body's shapes. meshes: name and text of the OBJ files that are gone by now.
 
-        Raises ValueError for a shape that is none of `box_round`'s.
+        One with a shape of which `box_round` does not know the box stays unknown.
         """
         shapes = pybullet.getVisualShapeData(body, physicsClientId=self.client)
-        self.boxes[body] = [
-            (link, box_round(kind, size, file.decode(), meshes or {}) @ turn(pose[1]).T + pose[0])
-            for _, link, kind, size, file, *pose in shapes
-        ]
+        with suppress(OSError, ValueError):
+            self.boxes[body] = [
+                (link, box_round(kind, size, file.decode(), meshes or {}) @ turn(q).T + place)
+                for _, link, kind, size, file, place, q, *_ in shapes
+            ]
 
     def window(self, sees: np.ndarray, size: int) -> Window | None:
         """The part of a picture of size x size pixels in which the bodies can be; None if they are
@@ -114,7 +116,8 @@ def link_frame(body: int, link: int, client: int) -> Pose:
 def box_round(kind: int, size: Sequence[float], file: str, meshes: dict[str, str]) -> np.ndarray:
     """Corners (8, 3) in m of the box round a shape of `getVisualShapeData`.
 
-    Raises ValueError for other kinds than boxes, balls, cylinders, capsules and meshes.
+    Raises ValueError for other kinds than boxes, balls, cylinders, capsules and meshes, and for
+    meshes that are neither OBJ nor binary STL; OSError for a file that is gone.
     """
     if kind == pybullet.GEOM_MESH:
         name = file.rpartition("/")[2]
