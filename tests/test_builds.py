@@ -139,6 +139,25 @@ def test_a_frame_is_the_same_from_tuples_and_their_reading_is_cheap(monkeypatch)
     assert np.array_equal(world.render(), want)
 
 
+def test_the_segments_of_a_frame_are_small_numbers(monkeypatch):
+    """Python has those ready. Left out, they are as large as floats read as whole numbers: without
+    NumPy inside, one more number to make of each pixel."""
+    env = tasks.bare("push")
+    env.reset(seed=0)
+    world = env.world
+    real, segments = world.p.getCameraImage, []
+
+    def camera(*args, **kwargs):
+        image = real(*args, **kwargs)
+        segments.append(np.unique(image[4]))
+        return image
+
+    monkeypatch.setattr(world.p, "getCameraImage", camera, raising=False)
+    world.render()
+    assert len(segments) == 1
+    assert -1 <= segments[0][0] < segments[0][-1] < world.p.getNumBodies()
+
+
 def test_what_moves_is_seen_where_it_is_nearer_than_the_scenery(monkeypatch):
     world = tasks.bare("push").world
     behind = np.full((168, 168), 0.5, np.float32)

@@ -252,11 +252,13 @@ class World:
         if window is None:
             return picture, depth
         width, height = window.size
+        # Its segments are not needed, but PyBullet fills what it is told to leave out with whatever
+        # its memory holds: large numbers, dear to make where it lacks NumPy.
         _, _, rgba, near, _ = self.p.getCameraImage(
             width, height, self.view, window.projection(self.projection, WHOLE.right),
             lightDirection=self.light, shadow=0,
             lightAmbientCoeff=0.65, lightDiffuseCoeff=0.35, lightSpecularCoeff=0.0,
-            renderer=self.p.ER_TINY_RENDERER, flags=self.p.ER_NO_SEGMENTATION_MASK,
+            renderer=self.p.ER_TINY_RENDERER,
         )  # fmt: skip
         there = slice(window.top, window.bottom), slice(window.left, window.right)
         near = numbers(near, np.float32).reshape(height, width)
