@@ -31,7 +31,7 @@ from lbw_minimal.training import write_atomic
 from tasks.world.env import TaskEnv
 from tasks.world.meshes import normals, read_mesh, read_obj
 from tasks.world.scene import Vector, World
-from tasks.world.windows import link_frame, turn
+from tasks.world.windows import link_frames, turn
 
 # m, from the side, like the environments' camera
 EYE, TARGET = (0.5, -1.2, 0.45), (0.42, 0.0, 0.22)
@@ -185,9 +185,8 @@ class Recorder:
 
     def snap(self) -> None:
         """Append the current pose of every link as one frame of the animation."""
-        self.frames.append(
-            np.array([np.concatenate(link_frame(*link, self.client)) for link in self.links])
-        )
+        poses = [link_frames(body, [link], self.client)[0] for body, link in self.links]
+        self.frames.append(np.array([np.concatenate(pose) for pose in poses]))
 
     def html(self, title: str, fps: float = 25) -> str:
         """A page that needs nothing else: the recorded frames, `fps` a second, over and over.

@@ -52,7 +52,7 @@ class Shapes:
 
     def __init__(self, client: int):
         self.client = client  # PyBullet's number for it
-        self.boxes: dict[int, list[tuple[int, np.ndarray]]] = {}  # by body: link and corners
+        self.boxes: dict[int, tuple[list[int], np.ndarray]] = {}  # by body: links, corners
 
     def add(self, body: int, meshes: dict[str, str] | None = None) -> None:
         """Learn a body's shapes. meshes: name and text of the OBJ files that are gone by now.
@@ -61,10 +61,12 @@ class Shapes:
         """
         shapes = pybullet.getVisualShapeData(body, physicsClientId=self.client)
         with suppress(OSError, ValueError):
-            self.boxes[body] = [
-                (link, box_round(kind, size, file.decode(), meshes or {}) @ turn(q).T + place)
-                for _, link, kind, size, file, place, q, *_ in shapes
+            corners = [
+                box_round(kind, size, file.decode(), meshes or {}) @ turn(q).T + place
+                for _, _, kind, size, file, place, q, *_ in shapes
             ]
+            links = [link for _, link, *_ in shapes]
+            self.boxes[body] = links, np.reshape(corners, (-1, 8, 3))
 
     def window(self, sees: np.ndarray, size: int) -> Window | None:
         """The part of a picture of size x size pixels in which the bodies can be; None if they are
@@ -73,14 +75,7 @@ class Shapes:
         sees: projection times view matrix, (4, 4). If a body reaches behind the camera, it is all
         of the picture.
         """
-        shapes = [(body, *box) for body, boxes in self.boxes.items() for box in boxes]
-        if not shapes:
-            return None
-        poses = [link_frame(body, link, self.client) for body, link, _ in shapes]
-        turns, places = np.array([turn(q) for _, q in poses]), np.array([x for x, _ in poses])
-        corners = np.array([corners for *_, corners in shapes]) @ turns.swapaxes(1, 2)
-        rows = sees[[0, 1, 3]]  # right, up and ahead
-        seen = (corners + places[:, None]) @ rows[:, :3].T + rows[:, 3]  # (n, 8, 3)
+        seen = self._seen(sees[[0, 1, 3]])
         ahead = seen[..., 2] > 0
         seen = seen[ahead.any(axis=1)]  # what is wholly behind the camera is out of sight
         if not len(seen):
@@ -96,18 +91,39 @@ class Shapes:
         ends = np.concatenate([low[inside].min(axis=0), high[inside].max(axis=0)])
         return Window(*ends.astype(int).tolist())
 
+    def _seen(self, rows):
+        """Corners of all boxes as the camera sees them, (n, 8, 3): right, up and ahead, which are
+        the rows (3, 4) of a matrix."""
+        poses = [
+            pose
+            for body, (links, _) in self.boxes.items()
+            for pose in link_frames(body, links, self.client)
+        ]
+        if not poses:
+            return np.empty((0, 8, 3))
+        turns = np.reshape([pybullet.getMatrixFromQuaternion(q) for _, q in poses], (-1, 3, 3))
+        places = np.array([place for place, _ in poses]) @ rows[:, :3].T + rows[:, 3]
+        corners = np.concatenate([corners for _, corners in self.boxes.values()])
+        return corners @ (rows[:, :3] @ turns).swapaxes(1, 2) + places[:, None]
+
 
 def turn(quaternion: Sequence[float] | np.ndarray) -> np.ndarray:
     """Rotation matrix (3, 3) of a quaternion (x, y, z, w)."""
     return np.reshape(pybullet.getMatrixFromQuaternion(quaternion), (3, 3))
 
 
-def link_frame(body: int, link: int, client: int) -> Pose:
-    """The pose of a link's URDF frame, in which its visual frames are given; the base is -1."""
-    if link >= 0:
-        return pybullet.getLinkState(
-            body, link, computeForwardKinematics=True, physicsClientId=client
-        )[4:6]
+def link_frames(body: int, links: Sequence[int], client: int) -> list[Pose]:
+    """The poses of links' URDF frames, in which their visual frames are given; the base is -1."""
+    joined = [link for link in links if link >= 0]
+    states = pybullet.getLinkStates(  # one call: it asks the body for all of its state
+        body, joined, computeForwardKinematics=True, physicsClientId=client
+    )
+    poses = iter(state[4:6] for state in states)
+    return [next(poses) if link >= 0 else base_frame(body, client) for link in links]
+
+
+def base_frame(body: int, client: int) -> Pose:
+    """The pose of a base's URDF frame."""
     mass = pybullet.getBasePositionAndOrientation(body, client)
     inertial = pybullet.getDynamicsInfo(body, -1, client)[3:5]
     return pybullet.multiplyTransforms(*mass, *pybullet.invertTransform(*inertial))
