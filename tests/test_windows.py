@@ -10,7 +10,7 @@ from tasks import TASKS
 from tasks.world import World, expert_actions
 from tasks.world.env import TaskEnv
 from tasks.world.scene import WHOLE
-from tasks.world.windows import Window, box_round
+from tasks.world.windows import CORNERS, Window, box_round, ends_inside
 
 EMBODIMENTS = ("robot", "human")
 
@@ -109,6 +109,59 @@ def test_the_window_fits_each_kind_of_shape(world, tmp_path, kind, size):
     least = (np.ptp(rows) + 1) * (np.ptp(columns) + 1)
     assert lost == 0
     assert 300 < least < kept < 2.6 * least  # a box round a ball is larger in a picture
+
+
+def test_the_window_is_no_wider_for_what_of_a_bar_is_above_the_picture(world):
+    """It comes in from the upper left, from beyond where the picture ends at the left."""
+    bar = world.box((0.01, 0.01, 0.6), (0, 0, 0), (1, 0, 0, 1))
+    slanted = world.p.getQuaternionFromEuler((0, -0.6, 0))
+    world.p.resetBasePositionAndOrientation(bar, (0.28, 0, 0.6), slanted)
+    lost, kept = outside(world)
+    _, depth = world._composite(WHOLE)
+    rows, columns = np.nonzero(depth < world.depth)
+    assert lost == 0 == rows.min()
+    assert columns.min() > 30
+    assert kept < 1.2 * (np.ptp(rows) + 1) * (np.ptp(columns) + 1)
+
+
+def placed(x, y):
+    """Pixels (2, 1, 8) of a box that covers x and y from the first number to the second."""
+    return np.where(CORNERS[:, None, :2] < 0, [x[0], y[0]], [x[1], y[1]]).transpose(2, 1, 0)
+
+
+def test_a_box_reaches_as_far_as_what_of_it_is_in_the_picture():
+    """Of 100 x 100 pixels and one more on each side."""
+    slanted = np.where(CORNERS[:, 2] < 0, [[40.0], [-100.0]], [[80.0], [100.0]])[:, None]
+    beyond = (-900, 900)
+    for pixels, low, high in (
+        (placed((20, 30), (40, 60)), (20, 40), (30, 60)),
+        (slanted, (59.8, -100), (80, 100)),  # comes in at y = -1
+        (slanted[::-1], (-100, 59.8), (100, 80)),
+        (120 - slanted, (40, 20), (56.2, 220)),  # leaves at y = 101
+        (placed((-900, 30), beyond), (-900, -900), (30, 900)),
+        (placed(beyond, beyond), (-900, -900), (900, 900)),
+        (placed((10, 20), (-1, 50)), (10, -1), (20, 50)),  # an edge runs along the picture's
+        (placed((10, 20), (50, 101)), (10, 50), (20, 101)),
+    ):
+        found = ends_inside(pixels, 100)
+        np.testing.assert_allclose(found, np.array([low, high])[..., None], atol=1e-9)
+    for x, y in (((20, 30), (-9, -2)), ((20, 30), (102, 900))):
+        assert np.isnan(ends_inside(placed(x, y), 100)[0][0])
+        assert np.isnan(ends_inside(placed(y, x), 100)[1][1])
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_the_box_round_a_mesh_is_turned_as_the_mesh_is(axis):
+    """A sheet of 1 x 2 that is turned by 30 degrees about one axis of its file."""
+    turned = np.reshape(pybullet.getMatrixFromQuaternion(
+        pybullet.getQuaternionFromAxisAngle(np.eye(3)[axis], np.radians(30))
+    ), (3, 3))  # fmt: skip
+    sheet = (CORNERS * (0.5, 1, 0) + (4, 5, 6)) @ turned.T
+    lines = [f"v {x} {y} {z}" for x, y, z in sheet] + ["f 1 2 3", "f 4 5 6", "f 6 7 8"]
+    corners = box_round(pybullet.GEOM_MESH, (1, 1, 1), "b.obj", {"b.obj": "\n".join(lines)})
+    apart = np.linalg.norm(corners[:, None] - sheet, axis=2)
+    np.testing.assert_allclose(apart.min(axis=0), 0, atol=1e-9)
+    np.testing.assert_allclose(apart.min(axis=1), 0, atol=1e-9)
 
 
 def test_a_mesh_that_is_gone_is_known_by_its_text(world, tmp_path):

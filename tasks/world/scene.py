@@ -270,7 +270,7 @@ class World:
 
     def _sees(self):
         """From metres to the picture, (4, 4): projection times view."""
-        projection, view = (np.reshape(m, (4, 4)).T for m in (self.projection, self.view))
+        projection, view = np.reshape((self.projection, self.view), (2, 4, 4)).swapaxes(1, 2)
         return projection @ view
 
     def position(self, body: int) -> np.ndarray:

@@ -19,6 +19,10 @@ from tasks.world.meshes import read_mesh, read_obj
 
 MARGIN = 1  # pixels: the renderer rounds a corner as it likes
 CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])  # of a box
+# Numbers of the corners at which each of its edges begins, (12,), and of those at which it ends.
+STARTS, ENDS = np.array([(i, j) for j in range(8) for i in range(j) if i ^ j in (1, 2, 4)]).T
+# Radians by which a box round a mesh is turned: none comes first, and wins where it is no worse.
+ANGLES = np.radians(sorted(range(-45, 46, 5), key=abs))
 
 Pose = tuple[tuple[float, ...], tuple[float, ...]]  # position in m and quaternion (x, y, z, w)
 
@@ -39,15 +43,16 @@ class Window(NamedTuple):
     def projection(self, whole: Sequence[float], size: int) -> tuple[float, ...]:
         """The projection matrix that fills a picture with this window of what `whole` shows on size
         x size pixels; both (16,), column by column."""
-        matrix = np.reshape(whole, (4, 4)).T.copy()
+        matrix = list(whole)
         beyond = size - self.left - self.right, self.top + self.bottom - size
         for row, (pixels, off) in enumerate(zip(self.size, beyond, strict=True)):
-            matrix[row] = (size * matrix[row] + off * matrix[3]) / pixels
-        return tuple(matrix.T.ravel().tolist())
+            pairs = zip(matrix[row::4], matrix[3::4], strict=True)
+            matrix[row::4] = [(size * one + off * ahead) / pixels for one, ahead in pairs]
+        return tuple(matrix)
 
 
 class Shapes:
-    """The shapes of a client's bodies, each as the corners (8, 3) in m of a box round it in the
+    """The shapes of a client's bodies, each as the corners (3, 8) in m of a box round it in the
     frame of its link."""
 
     def __init__(self, client: int):
@@ -62,11 +67,11 @@ class Shapes:
         shapes = pybullet.getVisualShapeData(body, physicsClientId=self.client)
         with suppress(OSError, ValueError):
             corners = [
-                box_round(kind, size, file.decode(), meshes or {}) @ turn(q).T + place
+                (box_round(kind, size, file.decode(), meshes or {}) @ turn(q).T + place).T
                 for _, _, kind, size, file, place, q, *_ in shapes
             ]
             links = [link for _, link, *_ in shapes]
-            self.boxes[body] = links, np.reshape(corners, (-1, 8, 3))
+            self.boxes[body] = links, np.reshape(corners, (-1, 3, 8))
 
     def window(self, sees: np.ndarray, size: int) -> Window | None:
         """The part of a picture of size x size pixels in which the bodies can be; None if they are
@@ -76,23 +81,23 @@ class Shapes:
         of the picture.
         """
         seen = self._seen(sees[[0, 1, 3]])
-        ahead = seen[..., 2] > 0
-        seen = seen[ahead.any(axis=1)]  # what is wholly behind the camera is out of sight
-        if not len(seen):
+        seen = seen[:, seen[2].max(axis=1) > 0]  # what is wholly behind the camera is out of sight
+        if not seen.size:
             return None
-        if seen[..., 2].min() <= 0:
+        if seen[2].min() <= 0:
             return Window(0, 0, size, size)
-        pixels = (seen[..., :2] / seen[..., 2:] * (1, -1) + 1) / 2 * size
-        low = np.clip(np.floor(pixels.min(axis=1)) - MARGIN, 0, size)
-        high = np.clip(np.ceil(pixels.max(axis=1)) + MARGIN, 0, size)
-        inside = (low < high).all(axis=1)
+        x, y = seen[:2] / seen[2]
+        low, high = ends_inside(np.array([1 + x, 1 - y]) / 2 * size, size)
+        low = np.clip(np.floor(low) - MARGIN, 0, size)
+        high = np.clip(np.ceil(high) + MARGIN, 0, size)
+        inside = (low < high).all(axis=0)
         if not inside.any():
             return None
-        ends = np.concatenate([low[inside].min(axis=0), high[inside].max(axis=0)])
+        ends = np.concatenate([low[:, inside].min(axis=1), high[:, inside].max(axis=1)])
         return Window(*ends.astype(int).tolist())
 
     def _seen(self, rows):
-        """Corners of all boxes as the camera sees them, (n, 8, 3): right, up and ahead, which are
+        """Corners of all boxes as the camera sees them, (3, n, 8): right, up and ahead, which are
         the rows (3, 4) of a matrix."""
         poses = [
             pose
@@ -100,11 +105,29 @@ class Shapes:
             for pose in link_frames(body, links, self.client)
         ]
         if not poses:
-            return np.empty((0, 8, 3))
-        turns = np.reshape([pybullet.getMatrixFromQuaternion(q) for _, q in poses], (-1, 3, 3))
+            return np.empty((3, 0, 8))
+        turns = np.array([pybullet.getMatrixFromQuaternion(q) for _, q in poses])
         places = np.array([place for place, _ in poses]) @ rows[:, :3].T + rows[:, 3]
         corners = np.concatenate([corners for _, corners in self.boxes.values()])
-        return corners @ (rows[:, :3] @ turns).swapaxes(1, 2) + places[:, None]
+        return (rows[:, :3] @ turns.reshape(-1, 3, 3) @ corners + places[..., None]).swapaxes(0, 1)
+
+
+def ends_inside(pixels: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
+    """How far boxes reach in a picture of size x size pixels, without what of them is more than
+    MARGIN beyond its edges: the lowest x and y of each, (2, n), and the highest; NaN where nothing
+    is left.
+
+    pixels: x and y of their corners, (2, n, 8). For x a box is cut at the picture's upper and
+    lower edge, for y at its left and right one.
+    """
+    start = pixels.take(STARTS, axis=2)
+    way = pixels.take(ENDS, axis=2) - start  # (2, n, 12)
+    edges = np.reshape((-MARGIN, size + MARGIN), (2, 1, 1, 1))
+    with np.errstate(divide="ignore", invalid="ignore"):  # some run along the picture's edges
+        parts = (edges - start[::-1]) / way[::-1]  # of the way, (2, 2, n, 12)
+    parts = np.clip(parts, 0, 1)  # where it comes in and where it leaves, or none
+    places = np.where(parts[0] == parts[1], np.nan, start + parts * way)
+    return np.fmin.reduce(places, axis=(0, 3)), np.fmax.reduce(places, axis=(0, 3))
 
 
 def turn(quaternion: Sequence[float] | np.ndarray) -> np.ndarray:
@@ -137,8 +160,7 @@ def box_round(kind: int, size: Sequence[float], file: str, meshes: dict[str, str
     """
     if kind == pybullet.GEOM_MESH:
         name = file.rpartition("/")[2]
-        low, high = _ends_of_text(meshes[name]) if name in meshes else _ends_of_file(file)
-        return ((low + high) / 2 + CORNERS * (high - low) / 2) * size
+        return (_least_of_text(meshes[name]) if name in meshes else _least_of_file(file)) * size
     half = {
         pybullet.GEOM_BOX: np.array(size) / 2,
         pybullet.GEOM_SPHERE: np.full(3, size[0]),
@@ -151,14 +173,25 @@ def box_round(kind: int, size: Sequence[float], file: str, meshes: dict[str, str
 
 
 @cache
-def _ends_of_file(file):
-    return _ends(read_mesh(file))
+def _least_of_file(file):
+    return _least_box(read_mesh(file))
 
 
 @cache
-def _ends_of_text(text):
-    return _ends(read_obj(text))
+def _least_of_text(text):
+    return _least_box(read_obj(text))
 
 
-def _ends(triangles):
-    return triangles.min(axis=(0, 1)), triangles.max(axis=(0, 1))
+def _least_box(triangles):
+    """Corners (8, 3) of the box of least surface, of which least is seen, among those turned about
+    one axis after the other, 5 degrees at a time."""
+    points, best = np.unique(triangles.reshape(-1, 3), axis=0), np.eye(3)
+    for axis in np.eye(3):
+        turns = [best @ turn(pybullet.getQuaternionFromAxisAngle(axis, a)) for a in ANGLES]
+        best = min(turns, key=lambda turned: round(_surface(np.ptp(points @ turned, axis=0)), 12))
+    low, high = (points @ best).min(axis=0), (points @ best).max(axis=0)
+    return ((low + high) / 2 + CORNERS * (high - low) / 2) @ best.T
+
+
+def _surface(sides):
+    return sides @ np.roll(sides, 1)
