@@ -60,6 +60,9 @@ def developed(rng, frames):
         if blur:
             picture = cv2.GaussianBlur(picture, (0, 0), blur)
         noise = rng.standard_normal((h, w, 1)) + 0.5 * rng.standard_normal((h, w, 3))
-        picture += sigma * 0.8 * noise * np.sqrt((picture + 20) / 140).clip(0.3, 1.5)
-        out[t] = np.clip(picture, 0, 255)
+        strength = picture + 20
+        np.sqrt(np.divide(strength, 140, out=strength), out=strength).clip(0.3, 1.5, out=strength)
+        noise *= sigma * 0.8
+        picture += np.multiply(noise, strength, out=noise)
+        out[t] = np.clip(picture, 0, 255, out=picture)
     return out

@@ -111,11 +111,14 @@ def _pictures(rng, task, kind, size, told):
                 before = thing[t] + (1.5 * d * half[0], 0)
                 paint.stick(limb, shoulder, before, 0.1 * u, 2.2 * half.max(), person.cloth)
             dark = cv2.GaussianBlur(np.roll(limb[1], round(0.05 * u), 0), (0, 0), 0.03 * u)
-            room_t = room * (1 - shade * dark[..., None])
+            room_t, used = room.copy(), paint.part(dark)
+            room_t[used] *= 1 - shade * dark[used][..., None]
         else:
             room_t, limb = room, None
         soft = cv2.GaussianBlur(shadow[1], (0, 0), 0.02 * u)
-        picture = paint.over(room_t * (1 - 0.5 * soft[..., None]), layer)
+        picture, used = room_t.copy(), paint.part(soft)
+        picture[used] *= 1 - 0.5 * soft[used][..., None]
+        picture = paint.over(picture, layer)
         picture = paint.over(picture, limb) if limb is not None else picture
         if other is not None:
             second = paint.empty(h, w)

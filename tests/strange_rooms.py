@@ -65,7 +65,15 @@ def empty(h, w):
 
 def over(picture, layer):
     """The picture with the layer in front."""
-    return picture * (1 - layer[1][..., None]) + layer[0]
+    out, used = picture.copy(), part(layer[1])
+    out[used] = out[used] * (1 - layer[1][used][..., None]) + layer[0][used]
+    return out
+
+
+def part(opacity):
+    """The rows and columns of a layer between which all is that is on it."""
+    y, x = np.flatnonzero(opacity.any(1)), np.flatnonzero(opacity.any(0))
+    return np.s_[y[0] : y[-1] + 1, x[0] : x[-1] + 1] if len(y) else np.s_[:0, :0]
 
 
 # The room

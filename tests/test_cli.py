@@ -261,26 +261,26 @@ def test_help_names_the_defaults_there_are(command):
         assert "seed" in text and "(default: 0)" in text
 
 
-@pytest.mark.parametrize("option", OPTIONS)
 @pytest.mark.parametrize("command", PARSERS)
-def test_every_option_is_a_commands_own_or_refused_with_the_name_of_its_command(command, option):
+def test_every_option_is_a_commands_own_or_refused_with_the_name_of_its_command(command):
     parser = PARSERS[command]
     takes = [action.dest for action in parser._actions]
     needed = ["push"] * ("task" in takes) + ["my.mp4"] * ("file" in takes)
-    if option in parser.options():
-        action = parser._option_string_actions[option]
-        values = {"--set": "K=3", "--reward": "literal", "--without": "trim", "--jitter": "0.02"}
-        values |= {"--tip": "3,4@1", "--object": "3,4@1"}
-        value = values.get(option, "200")
-        value = action.choices[-1] if action.choices else value
-        args = parser.read([*needed, option] + [value] * (action.nargs != 0))
-        assert getattr(args, action.dest) != action.default
-    else:
-        with pytest.raises(InputError) as error:
-            parser.read([*needed, option, "1"])
-        owners = [name for name, other in PARSERS.items() if option in other.options()]
-        assert str(error.value).startswith(f"{command}: {option} ")
-        assert all(f"python -m tasks {owner}" in str(error.value) for owner in owners)
+    values = {"--set": "K=3", "--reward": "literal", "--without": "trim", "--jitter": "0.02"}
+    values |= {"--tip": "3,4@1", "--object": "3,4@1"}
+    for option in OPTIONS:
+        if option in parser.options():
+            action = parser._option_string_actions[option]
+            value = values.get(option, "200")
+            value = action.choices[-1] if action.choices else value
+            args = parser.read([*needed, option] + [value] * (action.nargs != 0))
+            assert getattr(args, action.dest) != action.default, option
+        else:
+            with pytest.raises(InputError) as error:
+                parser.read([*needed, option, "1"])
+            owners = [name for name, other in PARSERS.items() if option in other.options()]
+            assert str(error.value).startswith(f"{command}: {option} ")
+            assert all(f"python -m tasks {owner}" in str(error.value) for owner in owners), option
 
 
 def test_no_command_prints_the_tasks_and_three_commands_to_try(capfd):

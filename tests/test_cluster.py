@@ -27,8 +27,8 @@ from tests.grade.files import File
 ROOT = Path(__file__).resolve().parents[1]
 SOLVED = json.loads((ROOT / "solutions" / "06_reward.ipynb").read_text())
 BARREN = cluster.LEAN / "rfc3987_syntax" / "__init__.py"
-# A run of a second. It notes who runs it, goes on where another stopped, and its wins depend on the
-# perception it was given.
+# A run, on a cluster of a second. It notes who runs it, goes on where another stopped, and its wins
+# depend on the perception it was given.
 TOY = """
 import json, os, sys, time
 from pathlib import Path
@@ -38,7 +38,8 @@ task, seed, out = sys.argv[1], int(value("--seed")), Path(value("--out"))
 with STARTS.open("a") as f:
     print(out.name, os.environ.get("RAY_RAYLET_PID"), os.getppid(), os.getpid(), file=f)
 resumed = int((out / "policy.checkpoint").read_text()) if "--resume" in sys.argv else 0
-time.sleep(1)
+if "RAY_RAYLET_PID" in os.environ:
+    time.sleep(1)
 seen = 0
 if "--weights" in sys.argv:
     seen = 1 + int((Path(value("--weights")) / "translation.safetensors").read_text())

@@ -811,7 +811,7 @@ def test_weights_are_small():
 
 def test_shipped_weights_find_tip_and_object_in_drawings_held_out(shipped):
     errors = {"tip": [], "object": []}
-    for i in range(40):
+    for i in range(20):
         clip = draw_clip(np.random.default_rng([1_000_000, i]))
         found = shipped.detect(clip.frames)
         for what, kept in errors.items():

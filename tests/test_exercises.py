@@ -45,16 +45,15 @@ def test_a_mistake_costs_points_and_gets_its_own_hint(exercise, mistake):
     assert mistake.hint in [o.message for o in result.outcomes], result.lines()
 
 
-@pytest.mark.parametrize("exercise", ALL.values(), ids=list(ALL))
-def test_mistakes_of_three_kinds_and_more_are_anticipated(exercise):
-    assert len({m.hint for m in exercise.mistakes}) >= 3
+def test_mistakes_of_three_kinds_and_more_are_anticipated():
+    assert not [e.id for e in ALL.values() if len({m.hint for m in e.mistakes}) < 3]
 
 
-@pytest.mark.parametrize("exercise", ALL.values(), ids=list(ALL))
-def test_inputs_pass_to_the_students_process_unchanged(exercise):
-    for check in exercise.checks:
+def test_inputs_pass_to_the_students_process_unchanged():
+    for id, check in ((e.id, check) for e in ALL.values() for check in e.checks):
         args = check.inputs(np.random.default_rng(0))
-        assert encode(decode(encode(args))) is not None and b'"other"' not in encode(args)[:10_000]
+        assert encode(decode(encode(args))) is not None, id
+        assert b'"other"' not in encode(args)[:10_000], id
 
 
 @pytest.mark.parametrize("exercise", ALL.values(), ids=list(ALL))
@@ -72,9 +71,9 @@ def test_nonsense_earns_nothing_and_breaks_nothing(exercise):
 
 
 @pytest.mark.parametrize("value", [0.0, "fair"])
-@pytest.mark.parametrize("exercise", ALL.values(), ids=list(ALL))
-def test_an_answer_that_is_always_the_same_earns_nothing(exercise, value):
-    assert judge(exercise, lambda args: (value, False)).points == 0
+def test_an_answer_that_is_always_the_same_earns_nothing(value):
+    for exercise in ALL.values():
+        assert judge(exercise, lambda args: (value, False)).points == 0, exercise.id
 
 
 def test_a_hint_that_explains_little_of_what_is_wrong_is_not_given():

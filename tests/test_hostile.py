@@ -24,7 +24,7 @@ def graded(tmp_path, whole, odd, path=""):
 
 @needs_sandbox
 def test_a_small_class_of_hostile_submissions_is_graded_as_it_should_be(tmp_path):
-    said, everything = graded(tmp_path, 8, 22)
+    said, everything = graded(tmp_path, 3, 22)
     assert said == "all as it should be", everything
 
 

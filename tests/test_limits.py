@@ -252,16 +252,15 @@ def test_a_copy_is_an_environment_of_its_own(name, how):
     twin.close()
 
 
-def test_environments_run_in_processes_that_gymnasium_spawns():
+def test_an_environment_runs_in_a_process_that_gymnasium_spawns():
     spawn = {"context": "spawn"}
     envs = gym.make_vec(
-        "LbW-Push-v0", num_envs=2, vectorization_mode="async", vector_kwargs=spawn, jitter=0.005
+        "LbW-Push-v0", num_envs=1, vectorization_mode="async", vector_kwargs=spawn, jitter=0.005
     )
-    frames, _ = envs.reset(seed=[3, 4])
     alone = make("push", observation="rgb", jitter=0.005)
-    for seed, frame in zip((3, 4), frames, strict=True):
-        np.testing.assert_array_equal(frame, alone.reset(seed=seed)[0])
-    assert envs.step(np.zeros((2, 3), np.float32))[0].shape == (2, 84, 84, 3)
+    for seed in (3, 4):
+        np.testing.assert_array_equal(envs.reset(seed=[seed])[0][0], alone.reset(seed=seed)[0])
+    assert envs.step(np.zeros((1, 3), np.float32))[0].shape == (1, 84, 84, 3)
     envs.close()
     alone.close()
 

@@ -23,7 +23,7 @@ from lbw_minimal import transporter as tp
 from lbw_minimal.images import to_images
 from lbw_minimal.training import Checkpoint, InputError, save_state
 
-TRAINING = 60  # iterations of the one training that several claims share, a second for ten
+TRAINING = 40  # iterations of the one training that several claims share, a second for five
 
 
 def squares(T=240, seed=0):

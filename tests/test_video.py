@@ -130,8 +130,8 @@ def by_opencv(path):
     return np.stack(frames)
 
 
-# Of each task the random motion and three experts, all with `make slow`.
-SOME = ("random", "expert_01", "expert_08", "expert_15")
+# Of each task the random motion and two experts, all with `make slow`.
+SOME = ("random", "expert_01", "expert_15")
 FILES = [
     pytest.param(path, marks=[] if path.stem in SOME else pytest.mark.slow)
     for path in sorted(SHIPPED.glob("*/*.mp4"))
