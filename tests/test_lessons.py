@@ -18,7 +18,6 @@ FOLD = re.compile(r"<details>\n<summary>([^<\n]+)</summary>\n\n(.+?)\n\n</detail
 HEAD = r"\*\*Exercise {}\.\*\* \*Difficulty ([1-3]) of 3, about (\d+) minutes\.\* \S"
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 by_name = pytest.mark.parametrize("path", SOURCES, ids=lambda p: p.stem)
-by_exercise = pytest.mark.parametrize("exercise", ALL.values(), ids=list(ALL))
 
 
 def of(exercise):
@@ -78,7 +77,7 @@ def given_away(hint, exercise):
     return {c for c in secrets(exercise) if c in said}
 
 
-@by_exercise
+@pytest.mark.parametrize("exercise", ALL.values(), ids=list(ALL))
 def test_an_exercise_says_how_difficult_it_is_and_how_long_it_takes(exercise):
     text, _ = task(exercise, of(exercise))
     assert len(re.findall(HEAD.format(re.escape(exercise.id)), text)) == 1

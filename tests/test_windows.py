@@ -10,7 +10,7 @@ from tasks import TASKS
 from tasks.world import World, expert_actions
 from tasks.world.env import TaskEnv
 from tasks.world.scene import WHOLE
-from tasks.world.windows import CORNERS, Window, box_round, ends_inside
+from tasks.world.windows import CORNERS, Window, box_round, ends_inside, turn
 
 EMBODIMENTS = ("robot", "human")
 
@@ -153,9 +153,7 @@ def test_a_box_reaches_as_far_as_what_of_it_is_in_the_picture():
 @pytest.mark.parametrize("axis", range(3))
 def test_the_box_round_a_mesh_is_turned_as_the_mesh_is(axis):
     """A sheet of 1 x 2 that is turned by 30 degrees about one axis of its file."""
-    turned = np.reshape(pybullet.getMatrixFromQuaternion(
-        pybullet.getQuaternionFromAxisAngle(np.eye(3)[axis], np.radians(30))
-    ), (3, 3))  # fmt: skip
+    turned = turn(pybullet.getQuaternionFromAxisAngle(np.eye(3)[axis], np.radians(30)))
     sheet = (CORNERS * (0.5, 1, 0) + (4, 5, 6)) @ turned.T
     lines = [f"v {x} {y} {z}" for x, y, z in sheet] + ["f 1 2 3", "f 4 5 6", "f 6 7 8"]
     corners = box_round(pybullet.GEOM_MESH, (1, 1, 1), "b.obj", {"b.obj": "\n".join(lines)})
