@@ -10,7 +10,9 @@ import subprocess
 import sys
 import threading
 import time
+from contextlib import ExitStack
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import pytest
 
@@ -74,14 +76,19 @@ def nodes(monkeypatch):
     from ray.cluster_utils import Cluster
 
     monkeypatch.setenv("RAY_USAGE_STATS_ENABLED", "0")
-    with cluster.on_path(cluster.LEAN):
-        here = Cluster(initialize_head=True, head_node_args={"num_cpus": 0})
-        for _ in range(2):
-            here.add_node(num_cpus=1, memory=4 << 30, object_store_memory=100 << 20)
-    monkeypatch.setenv("RAY_ADDRESS", here.address)
-    yield ray
-    ray.shutdown()
-    here.shutdown()
+    with ExitStack() as folders:
+        with cluster.on_path(cluster.LEAN):
+            here = Cluster(initialize_head=True, head_node_args={"num_cpus": 0})
+            for _ in range(2):
+                # As on two machines: a node unpacks the kit over what it finds, and would take it
+                # from under the other's jobs. Not in tmp_path: sockets' paths have to be short.
+                own = folders.enter_context(TemporaryDirectory(ignore_cleanup_errors=True))
+                size = {"memory": 4 << 30, "object_store_memory": 100 << 20}
+                here.add_node(num_cpus=1, temp_dir=own, **size)
+        monkeypatch.setenv("RAY_ADDRESS", here.address)
+        yield ray
+        ray.shutdown()
+        here.shutdown()
 
 
 def names(out):

@@ -15,6 +15,8 @@ from __future__ import annotations
 import base64
 import html
 from collections.abc import Iterable, Sequence
+from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -185,8 +187,12 @@ class Recorder:
 
     def snap(self) -> None:
         """Append the current pose of every link as one frame of the animation."""
-        poses = [link_frames(body, [link], self.client)[0] for body, link in self.links]
-        self.frames.append(np.array([np.concatenate(pose) for pose in poses]))
+        poses = [
+            np.concatenate(pose)
+            for body, of_it in groupby(self.links, key=itemgetter(0))
+            for pose in link_frames(body, [link for _, link in of_it], self.client)
+        ]
+        self.frames.append(np.array(poses))
 
     def html(self, title: str, fps: float = 25) -> str:
         """A page that needs nothing else: the recorded frames, `fps` a second, over and over.
