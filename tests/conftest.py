@@ -16,10 +16,10 @@ LONG = (
     "test_cluster.py", "test_grading.py", "test_stars.py", "test_strangers.py",
     "test_exercises.py", "test_tasks.py", "test_detector.py", "test_cli.py", "test_house.py",
     "test_answers.py", "test_arguments.py", "test_transporter.py", "test_prepare.py",
-    "test_systems.py", "test_limits.py", "test_follow.py", "test_rivals.py", "test_hostile.py",
-    "test_gradescope.py", "test_recordings.py", "test_grading_sandbox.py", "test_nbgrader.py",
-    "test_munit.py", "test_sac.py", "test_pages.py", "test_cyclegan.py", "test_clip.py",
-    "test_gallery.py", "test_stage.py", "test_video.py", "test_viewer.py",
+    "test_systems.py", "test_limits.py", "test_follow.py", "test_rivals.py",
+    "test_gradescope.py", "test_recordings.py", "test_grading_sandbox.py", "test_munit.py",
+    "test_sac.py", "test_pages.py", "test_cyclegan.py", "test_clip.py", "test_gallery.py",
+    "test_stage.py", "test_video.py", "test_viewer.py",
 )  # fmt: skip
 
 

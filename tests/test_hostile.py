@@ -23,6 +23,7 @@ def graded(tmp_path, whole, odd, path=""):
 
 
 @needs_sandbox
+@pytest.mark.slow
 def test_a_small_class_of_hostile_submissions_is_graded_as_it_should_be(tmp_path):
     said, everything = graded(tmp_path, 3, 22)
     assert said == "all as it should be", everything

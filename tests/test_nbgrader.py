@@ -14,6 +14,7 @@ from traitlets.config import Config
 from solutions.__main__ import ROOT
 from tests.grade.exercise import find
 
+pytestmark = pytest.mark.slow
 NAME = "06_reward"
 
 

@@ -103,6 +103,12 @@ def locate(frames, points):
 """,
 }
 by_star = pytest.mark.parametrize("number", FIRST)
+measured = pytest.mark.parametrize(
+    "number",
+    [
+        pytest.param(n, marks=pytest.mark.slow) if n == 4 else n for n in FIRST
+    ],  # it translates films
+)
 
 
 def once(translate):
@@ -150,7 +156,7 @@ def test_every_star_of_a_notebook_is_tried_here():
     assert marked == {f"{number:02}" for number in FIRST}
 
 
-@by_star
+@measured
 def test_the_kits_solution_shines_and_reaches_what_is_said(number):
     found = find(number)
     reached = found.measure(defined(number, cells(number)[1]))
@@ -158,7 +164,7 @@ def test_the_kits_solution_shines_and_reaches_what_is_said(number):
     assert reached == pytest.approx(found.ours, rel=0.02)
 
 
-@by_star
+@measured
 def test_a_first_thought_does_not_shine_and_reaches_what_is_said(number):
     found = find(number)
     reached = found.measure(defined(number, FIRST[number]))
