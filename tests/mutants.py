@@ -27,6 +27,7 @@ from concurrent.futures import ThreadPoolExecutor
 from importlib.util import cache_from_source
 from pathlib import Path
 from queue import Queue
+from threading import Lock
 from typing import NamedTuple
 
 import parso
@@ -321,15 +322,18 @@ def main() -> None:
             trees.put(Tree(Path(folder, str(i))))
         lines = Lines(measure(trees.queue[0].run, LINES))
 
+        writing = Lock()
+
         def meet(mutant: Mutant) -> None:
             tree = trees.get()
             try:
                 row = tree.meet(mutant, lines, args.again)
             finally:
                 trees.put(tree)
-            rows.append(row)
-            ordered = sorted(rows, key=lambda r: (r["file"], r["line"]))
-            write_atomic(args.out, json.dumps(ordered, indent=1))
+            with writing:
+                rows.append(row)
+                ordered = sorted(rows, key=lambda r: (r["file"], r["line"]))
+                write_atomic(args.out, json.dumps(ordered, indent=1))
             word = "noticed " if row["noticed"] else "SURVIVED"
             print(
                 f"{len(rows)}/{len(wanted)} {word} {row['file']}:{row['line']} {row['after']}",
