@@ -60,6 +60,15 @@ def test_what_moves_and_does_not_come_in_over_an_edge_is_no_arm():
     assert not far_end(frames)[1].any()
 
 
+@pytest.mark.parametrize(("wide", "arm"), [(4, False), (12, True)])
+def test_a_stick_that_covers_less_than_a_sixtieth_of_the_picture_is_no_arm(wide, arm):
+    """60 pixels deep, of which some more differ than it covers."""
+    frames = np.repeat(room(H, W)[None], len(DEPTHS), axis=0)
+    for frame, depth in zip(frames, DEPTHS, strict=True):
+        frame[H // 2 - wide // 2 : H // 2 + wide // 2, : min(depth, 60)] = (220, 170, 140)
+    assert far_end(frames)[1].any() == arm
+
+
 @pytest.mark.parametrize(
     ("share", "way", "outline"),
     [(0.45, 80, True), (0.55, 80, False), (1, 16, True), (1, 18, False)],

@@ -92,6 +92,8 @@ def test_the_gap_counts_only_while_the_object_moves():
     moving = [4, 5, 6, 7, 8]  # np.gradient looks to both sides
     assert gap(px) == pytest.approx(np.mean((thing - tip)[moving]), abs=0.005)
     assert gap(px[5:]) == 5.0
+    px[:, 2] += 0.123
+    assert gap(px) == 4.52
 
 
 def test_an_object_that_never_moves_has_no_gap():

@@ -122,6 +122,15 @@ def test_the_idle_beginning_and_end_are_left_out_and_said():
     assert [note.split(" s,")[0] for note in motion.notes[:2]] == ["The first 3.7", "The last 6.3"]
 
 
+@pytest.mark.parametrize("late", [0, 1, 5])
+def test_three_tenths_of_a_second_are_kept_before_the_hand_starts(late):
+    """It starts with the step of contact, or some steps before."""
+    x = np.tile((0.46, 0.02), (30, 1))
+    x[20 - late :, 0] += 0.01
+    starts = 20 - late - 1 - round(0.3 * FPS)
+    assert retarget._first_step(x, 20, SCENE) == starts
+
+
 def test_a_loop_that_begins_in_its_middle_is_cut_where_it_jumps():
     t = np.arange(0, 2.6, 1 / 30)
     turned = np.roll(np.arange(len(t)), 10)  # the last ten frames come first

@@ -196,6 +196,14 @@ def test_a_thing_that_is_pushed_from_its_place_is_the_object():
     assert told.object_sure.min() > 0.5 and told.tip is before.tip
 
 
+def test_a_thing_that_is_followed_is_as_sure_as_it_is_like_itself():
+    thing = vanished.vanished(film())
+    alike = np.full(N, 0.8)
+    alike[:2] = 1.0, 0.1
+    told = vanished.followed(thing._replace(alike=alike), film(), found(WAY + 7.0, 40))
+    assert told.object_sure == pytest.approx(np.array([1, 0, *[0.75] * (N - 2)]))
+
+
 def test_the_detector_is_believed_where_it_agrees_and_where_the_thing_is_not_pushed_or_hidden():
     agrees = found(WAY + 9.0)
     assert followed(film(), agrees) is agrees
