@@ -58,8 +58,10 @@ if not any((Path(__file__).parent.parent / "solutions").glob("*.ipynb")):
 @pytest.fixture(autouse=True)
 def one_thread():
     """Two threads wait for each other where the second core is busy, and take ten times as long."""
+    import cv2
     import torch
 
+    cv2.setNumThreads(1)
     torch.set_num_threads(1)
 
 

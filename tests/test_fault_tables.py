@@ -34,7 +34,9 @@ def changes_nothing(fault):
     return not fault["noticed"] and judged.startswith(("equivalent", "changes nothing"))
 
 
-@pytest.mark.parametrize("name", ["mutants", "mutants_again", "mutants_500", "mutants_200"])
+@pytest.mark.parametrize(
+    "name", ["mutants", "mutants_again", "mutants_500", "mutants_200", "mutants_seed4"]
+)
 def test_drawn_faults_were_noticed_as_often_as_their_table_says(name):
     drawn = read(f"{name}.json")
     telling = [fault for fault in drawn if not changes_nothing(fault)]

@@ -173,6 +173,7 @@ def test_results_are_valid_and_shown_to_students_as_text(found):
     assert found["stdout_visibility"] == "hidden"
 
 
+@pytest.mark.slow
 def test_several_notebooks_are_one_submission_and_none_is_a_valid_result(place):
     found = graded(place, {"06_reward.ipynb": notebook(), "06_reward_2.ipynb": notebook(WRONG)})
     assert faults(found) == [] and found["tests"][0]["score"] == 0
