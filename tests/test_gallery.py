@@ -13,6 +13,8 @@ from PIL import Image
 import tasks
 from tasks.commands import gallery, own_arm
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
@@ -64,7 +66,6 @@ def test_two_tasks_are_printed_on_a_sheet(copies, sheets, folder, tmp_path):
     assert len(re.findall(rb"/Type\s*/Page\b", (tmp_path / "page.pdf").read_bytes())) == sheets
 
 
-@pytest.mark.slow
 def test_a_clip_of_ones_own_is_shown_and_called_a_look_alike():
     """It is read from a file, found usable, and done again; six of its moments make a picture."""
     clip = own_arm.prepared()
