@@ -263,6 +263,15 @@ def test_a_mesh_is_drawn_as_large_as_its_scale_says():
     np.testing.assert_array_equal(at, np.eye(4))
 
 
+def test_a_capsule_has_a_ball_at_each_end_of_its_cylinder():
+    (middle, turned), *ends = drawing(p.GEOM_CAPSULE, (0.2, 0.04, 0.0), "", {})
+    assert (middle.height, middle.radiusTop, middle.radiusBottom) == (0.2, 0.04, 0.04)
+    assert turned @ (0, 1, 0, 0) == pytest.approx((0, 0, 1, 0))  # meshcat's lie along y
+    assert [ball.radius for ball, _ in ends] == [0.04, 0.04]
+    for (_, at), z in zip(ends, (-0.1, 0.1), strict=True):
+        assert at[:3, 3] == pytest.approx((0, 0, z))
+
+
 def test_a_shape_it_cannot_draw_is_named():
     with pytest.raises(ValueError, match=f"cannot draw a shape of PyBullet's type {p.GEOM_PLANE}"):
         drawing(p.GEOM_PLANE, (1.0, 1.0, 1.0), "", {})
