@@ -79,11 +79,11 @@ def nodes(monkeypatch):
     with ExitStack() as folders:
         with cluster.on_path(cluster.LEAN):
             here = Cluster(initialize_head=True, head_node_args={"num_cpus": 0})
+            size = {"memory": 4 << 30, "object_store_memory": 100 << 20}
             for _ in range(2):
                 # As on two machines: a node unpacks the kit over what it finds, and would take it
                 # from under the other's jobs. Not in tmp_path: sockets' paths have to be short.
                 own = folders.enter_context(TemporaryDirectory(ignore_cleanup_errors=True))
-                size = {"memory": 4 << 30, "object_store_memory": 100 << 20}
                 here.add_node(num_cpus=1, temp_dir=own, **size)
         monkeypatch.setenv("RAY_ADDRESS", here.address)
         yield ray

@@ -104,7 +104,7 @@ def locate(frames, points):
 }
 by_star = pytest.mark.parametrize("number", FIRST)
 # Films are translated, keypoints fitted and episodes played for three of them.
-measured = pytest.mark.parametrize(
+by_measured_star = pytest.mark.parametrize(
     "number", [pytest.param(n, marks=pytest.mark.slow) if n in (4, 5, 9) else n for n in FIRST]
 )
 
@@ -154,7 +154,7 @@ def test_every_star_of_a_notebook_is_tried_here():
     assert marked == {f"{number:02}" for number in FIRST}
 
 
-@measured
+@by_measured_star
 def test_the_kits_solution_shines_and_reaches_what_is_said(number):
     found = find(number)
     reached = found.measure(defined(number, cells(number)[1]))
@@ -162,7 +162,7 @@ def test_the_kits_solution_shines_and_reaches_what_is_said(number):
     assert reached == pytest.approx(found.ours, rel=0.02)
 
 
-@measured
+@by_measured_star
 def test_a_first_thought_does_not_shine_and_reaches_what_is_said(number):
     found = find(number)
     reached = found.measure(defined(number, FIRST[number]))
