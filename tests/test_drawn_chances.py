@@ -154,9 +154,9 @@ def clips():
     def over(picture, layer):
         return 0
 
-    for name in ("_mark", "_cabinet", "_bystander", "_object"):
+    for name in ("a_mark", "_cabinet", "a_bystander", "_object"):
         patch.setattr(drawings, name, nothing(name))
-    patch.setattr(drawings, "_room", room)
+    patch.setattr(drawings, "a_room", room)
     patch.setattr(drawings, "_story", tell)
     patch.setattr(drawings, "_lit", lit)
     patch.setattr(drawings, "a_colour", lambda rng, near: f"near the {near}")
@@ -176,8 +176,8 @@ def clips():
 @pytest.mark.parametrize(
     ("has", "share"),
     [
-        (lambda c: "_mark" in c, 0.35),
-        (lambda c: "_bystander" in c, 0.12),
+        (lambda c: "a_mark" in c, 0.35),
+        (lambda c: "a_bystander" in c, 0.12),
         (lambda c: c["shade"] > 0, 0.6),
         (lambda c: "person" in c, 0.92),  # nobody is in "alone" and in "nothing"
         (lambda c: "person" in c and c["person"].cloth != "its own", 0.92 * 0.15),

@@ -130,7 +130,7 @@ def test_a_hand_that_comes_from_outside_comes_from_where_its_shoulder_is():
 
 def test_a_room_has_colours_that_there_are():
     for seed in range(20):
-        picture, _ = drawings._room(np.random.default_rng(seed), story("push", seed))
+        picture, _ = drawings.a_room(np.random.default_rng(seed), story("push", seed))
         assert picture.min() >= 0
 
 
@@ -171,5 +171,5 @@ def test_a_drawers_front_hides_no_handle_and_a_door_is_as_high_where_it_is_pushe
 
 def test_who_passes_by_is_to_be_seen():
     for seed in range(30):
-        passes = drawings._bystander(np.random.default_rng(seed), T)
+        passes = drawings.a_bystander(np.random.default_rng(seed), T)
         assert any(passes(t)[..., 3].any() for t in range(0, T, 6))

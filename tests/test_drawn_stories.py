@@ -36,7 +36,7 @@ def test_a_hand_moves_as_hands_do_and_rests_before_and_after():
 def test_the_move_begins_when_the_hand_is_there_and_the_hand_leaves_when_it_is_over():
     time, rests = np.linspace(0, 1, 400)[:, None], []
     for seed in SEEDS:
-        begin, approach, move, retreat = drawings._phases(np.random.default_rng(seed), time)
+        begin, approach, move, retreat = drawings.phases(np.random.default_rng(seed), time)
         assert (approach[move > 0] == 1).all() and (move[time <= begin] == 0).all()
         assert (move[retreat > 0] == 1).all() and move[-1] == 1
         for part in (approach, move, retreat):
@@ -63,7 +63,7 @@ def test_rests_and_moves_last_as_long_as_in_real_clips_at_most():
     A tenth of a second of approach and retreat, and three of the move, are the least.
     """
     seconds = np.array([0.25, 0.7, 1.15, 1.4, 2.25, 3.1, 3.5, 3.9, 4.3])[:, None]
-    begin, approach, move, retreat = drawings._phases(Longest(), seconds / 4.6)
+    begin, approach, move, retreat = drawings.phases(Longest(), seconds / 4.6)
     assert begin == pytest.approx(1.4 / 4.6)
     np.testing.assert_allclose(approach[:3, 0], [0, 0.5, 1], atol=1e-9)
     np.testing.assert_allclose(move[3:6, 0], [0, 0.5, 1], atol=1e-9)
@@ -87,7 +87,7 @@ class Patient:
 def test_people_wait_before_they_come_at_the_object_and_after_the_push_and_the_retreat(rest):
     """Eight seconds, and half a second in which the hand comes, moves for 0.3 s, and goes."""
     time = (np.arange(8500) / 8500)[:, None]
-    _, *steps = drawings._phases(Patient(rest), time)
+    _, *steps = drawings.phases(Patient(rest), time)
     moves = np.abs(np.gradient(np.concatenate(steps, 1), axis=0)).max(1) > 0
     waits = np.flatnonzero(np.diff(moves))
     before = (0, 0.1, 0.4, 0.5)[rest]  # s
@@ -197,7 +197,7 @@ def test_walls_and_most_tables_have_clutter_and_the_ground_is_what_the_object_st
     )
     for seed in SEEDS:
         told, before = story("push", seed), len(asked)
-        picture, ground = drawings._room(np.random.default_rng(seed), told)
+        picture, ground = drawings.a_room(np.random.default_rng(seed), told)
         x, y = told.object[0].clip(0, SIZE - 1).astype(int)
         np.testing.assert_array_equal(ground, picture[y, x])
         (n, low, high), *table = asked[before:]

@@ -59,10 +59,16 @@ def test_drawings_to_measure_on_are_of_seeds_that_no_training_reaches(monkeypatc
     seeds = []
     clip = SimpleNamespace(frames=np.zeros((2, 84, 84, 3), np.uint8), tip=0, object=1)
     monkeypatch.setattr(eyes.np.random, "default_rng", lambda seed: seeds.append(seed))
-    monkeypatch.setattr(eyes, "draw_clip", lambda rng: clip)
-    drawn = list(eyes.drawn(Model()))
+    drawn = list(eyes.made(Model(), lambda rng: clip))
     assert len(drawn) == 100 and (drawn[0].tip, drawn[0].object, drawn[0].unit) == (0, 1, 1.0)
     assert min(first for first, _ in seeds) >= 1_000_000 and len({i for _, i in seeds}) == 100
+
+
+def test_half_of_the_clips_to_learn_from_are_rendered(monkeypatch):
+    monkeypatch.setattr(eyes, "render_clip", lambda rng: "rendered")
+    monkeypatch.setattr(eyes, "draw_clip", lambda rng: "drawn")
+    some = [eyes.a_clip(np.random.default_rng([0, i])) for i in range(400)]
+    assert 160 < some.count("rendered") < 240 and set(some) == {"rendered", "drawn"}
 
 
 @pytest.mark.parametrize("task", ["push", "reach"])

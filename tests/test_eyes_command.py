@@ -16,7 +16,8 @@ def told(tmp_path, monkeypatch):
     told = []
     monkeypatch.chdir(tmp_path)
 
-    def train(iterations, seed, device, workers, checkpoint):
+    def train(iterations, seed, device, workers, checkpoint, draw):
+        assert draw is eyes.a_clip
         told.append((iterations, seed, checkpoint.path.as_posix(), device, workers))
         checkpoint.path.write_text("cut off here")
         return SimpleNamespace(save=lambda path: path.write_text("weights")), ["row"]
@@ -27,7 +28,7 @@ def told(tmp_path, monkeypatch):
     monkeypatch.setattr(eyes.detector, "train", train)
     monkeypatch.setattr(eyes, "Detector", SimpleNamespace(load=load))
     monkeypatch.setattr(eyes, "compare", lambda clips: told.append(clips) or FIGURES)
-    monkeypatch.setattr(eyes, "drawn", lambda model: ("drawn", model))
+    monkeypatch.setattr(eyes, "made", lambda model, draw=eyes.draw_clip: (draw, model))
     monkeypatch.setattr(eyes, "filmed", lambda model, task: ("filmed", model, task))
     monkeypatch.setattr(eyes, "marked", lambda model, path, marks: ("marked", model, path))
     return told
@@ -41,13 +42,14 @@ def test_the_weights_that_are_shipped_are_those_that_are_measured(told, tmp_path
     assert asked[:4] == (30, 4, "runs/eyes-4.checkpoint", "cpu")
     assert not (tmp_path / "runs" / "eyes-4.checkpoint").exists()  # it has ended
     model = "a detector of eyes: weights"
-    assert measured == [("drawn", model), *(("filmed", model, task) for task in tasks.TASKS)]
+    assert measured[:2] == [(eyes.draw_clip, model), (eyes.render_clip, model)]
+    assert measured[2:] == [("filmed", model, task) for task in tasks.TASKS]
     assert metrics["command"] == "python -m tasks eyes --iterations 30 --seed 4"
     assert (metrics["iterations"], metrics["seed"], metrics["log"]) == (30, 4, ["row"])
     assert metrics["error"]["drawings"] == FIGURES
-    assert list(metrics["error"])[1:] == [f"{task}'s videos" for task in tasks.TASKS]
+    assert list(metrics["error"])[2:] == [f"{task}'s videos" for task in tasks.TASKS]
     rows = capsys.readouterr().out.splitlines()
-    assert len(rows) == 12 and rows[2].split() == [
+    assert len(rows) == 14 and rows[4].split() == [
         "reach's", "videos", "tip", "frames", "4", "px", "1.5",
     ]  # fmt: skip
 
@@ -60,7 +62,7 @@ def test_what_is_there_is_measured_again_and_keeps_its_other_figures(told, tmp_p
     (out / "metrics.json").write_text(json.dumps(old))
     eyes.main(["--measure", "--out", str(out)])
     metrics = json.loads((out / "metrics.json").read_text())
-    assert told[0] == ("drawn", "a detector of eyes: earlier")  # nothing was trained
+    assert told[0] == (eyes.draw_clip, "a detector of eyes: earlier")  # nothing was trained
     assert metrics["seed"] == 9 and metrics["error"]["push.mp4"] == FIGURES
     assert metrics["error"]["drawings"] == FIGURES
 

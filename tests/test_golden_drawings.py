@@ -50,7 +50,7 @@ def test_phases_of_a_motion_are_as_long_as_they_were(golden):
     time, figures = np.linspace(0, 1, 7)[:, None], {}
     for seed in range(15):
         rng = Told(seed)
-        begins, *steps = drawings._phases(rng, time)
+        begins, *steps = drawings.phases(rng, time)
         figures[f"when {seed}"] = [begins, *np.concatenate(steps).ravel()]
         if seed < 4:
             figures[f"draws {seed}"] = rng.draws
@@ -69,10 +69,10 @@ def test_things_rooms_and_bystanders_are_drawn_as_they_were(kind, golden):
     for seed in range(4):
         for name, make in (
             ("object", lambda rng: drawings._object(rng, story, ground)(3)),
-            ("bystander", lambda rng: drawings._bystander(rng, 5)(2)),
+            ("bystander", lambda rng: drawings.a_bystander(rng, 5)(2)),
             ("cabinet", lambda rng: drawings._cabinet(rng, story, ground)),
-            ("mark", lambda rng: drawings._mark(rng, story)),
-            ("room", lambda rng: drawings._room(rng, story)[0]),
+            ("mark", lambda rng: drawings.a_mark(rng, story)),
+            ("room", lambda rng: drawings.a_room(rng, story)[0]),
         ):
             rng = Told([seed, ord(name[0])])
             picture = make(rng).astype(float)

@@ -1,6 +1,6 @@
 """How many arms come into a clip, and where. Not from the paper.
 
-There are two witnesses. The detector was taught where arms are in drawings, and sees one that
+There are two witnesses. The detector was taught where arms are in made clips, and sees one that
 hardly moves; of some it is never sure. What moves in over an edge is an arm mostly, and sometimes a
 lamp. One of them is enough to believe in an arm, or in two; where each sees a second one faintly,
 both are.

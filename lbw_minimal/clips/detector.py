@@ -1,7 +1,8 @@
 """Eyes for any clip: where the tip of the arm is, and the object that it moves. Not from the paper.
 
-A small network that has seen nothing but drawings (`drawings.py`) looks at a frame and, for
-reference, at its clip's median, first and last frame: what differs from those is arm or object.
+A small network that has seen nothing but clips that were made for it, as `drawings.py` draws and
+`tasks/world/renderings.py` renders them, looks at a frame and, for reference, at its clip's median,
+first and last frame: what differs from those is arm or object.
 Both have a place, or are nowhere. The clip is looked at twice: as a whole, and closer where
 something happens.
 In: frames (T, H, W, 3) uint8 of one clip with a still camera. Out: `Found`, in pixels of these
@@ -11,7 +12,7 @@ frames from their left and upper edge; `refine` then follows the object by its o
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
@@ -25,9 +26,10 @@ from torch.utils.data import DataLoader, Dataset
 
 from lbw_minimal.clips.corners import followed
 from lbw_minimal.clips.detector_networks import Network, both_ways, loss, read
-from lbw_minimal.clips.drawings import draw_clip
+from lbw_minimal.clips.drawings import Clip, draw_clip
 from lbw_minimal.clips.drawn_shapes import SIZE
 from lbw_minimal.images import median_frame, to_images
+from lbw_minimal.munit_networks import bfloat16
 from lbw_minimal.training import (
     Checkpoint,
     InputError,
@@ -42,7 +44,7 @@ SURE = 0.5  # more is taken for there
 MOST = 60  # frames that the median is taken of, spread over the clip
 CLOSER = 0.8  # of the frame's longer side: a second look pays if it takes in less than this
 BATCH = 32
-LEARNING_RATE = 3e-3
+LEARNING_RATE = 2e-3
 SETTLE = 0.75  # share of the training, at its end, in which the learning rate falls to 0
 POOL = 512  # clips that batches are drawn from
 # Of them that make room for new ones in each iteration. Drawing takes long; but when each clip was
@@ -192,11 +194,11 @@ def with_references(frames: np.ndarray, around: np.ndarray) -> np.ndarray:
 class _Drawings(Dataset):
     """Clips and their references: clip i is the same whoever draws it, and whenever."""
 
-    def __init__(self, seed):
-        self.seed = seed
+    def __init__(self, seed, draw):
+        self.seed, self.draw = seed, draw
 
     def __getitem__(self, i):
-        clip = draw_clip(np.random.default_rng([self.seed, i]))
+        clip = self.draw(np.random.default_rng([self.seed, i]))
         return clip, references(clip.frames)
 
 
@@ -207,12 +209,13 @@ def _as_drawn(clip):
 class _Pool:
     """The clips that batches are drawn from. Other processes draw them while a network learns."""
 
-    def __init__(self, seed, steps, workers):
+    def __init__(self, seed, steps, workers, draw):
         first, end = NEW * steps.start, NEW * (steps.stop - 1) + POOL
         self.drawn = iter(
             DataLoader(
-                _Drawings(seed), batch_size=None, sampler=range(first, end), num_workers=workers,
-                prefetch_factor=AHEAD if workers else None, collate_fn=_as_drawn,
+                _Drawings(seed, draw), batch_size=None, sampler=range(first, end),
+                num_workers=workers, prefetch_factor=AHEAD if workers else None,
+                collate_fn=_as_drawn,
                 # The only way on macOS and Windows, and the only safe one beside CUDA.
                 multiprocessing_context="spawn" if workers else None,
                 generator=torch.Generator(),  # or a resumed training would draw from torch's own
@@ -244,10 +247,12 @@ def train(
     device: str = "cpu",
     workers: int = 0,
     checkpoint: Checkpoint | None = None,
+    draw: Callable[[np.random.Generator], Clip] = draw_clip,
 ) -> tuple[Detector, list[dict]]:
-    """Teach a detector with drawings. Returns it and a log: step, and the mean loss up to there.
+    """Teach a detector with made clips. Returns it and a log: step, and the mean loss up to there.
 
-    workers: processes that draw, whose number changes nothing else; 0 draws in this one.
+    workers: processes that draw, whose number changes nothing else; 0 draws in this one. draw: what
+    makes a clip; other processes find it by its name.
     """
     checkpoint = checkpoint or Checkpoint(None)
     to, rng = pick_device(device), seed_everything(seed)
@@ -256,7 +261,7 @@ def train(
     now, state = checkpoint.resume(
         dict(network=network, optimizer=optimizer, rng=rng), step=0, log=[], sum=0.0
     )
-    pool = _Pool(seed, range(now.step, iterations), workers)
+    pool = _Pool(seed, range(now.step, iterations), workers, draw)
     bar = progress(iterations, "eyes", now.step)
     while now.step < iterations:
         # A constant rate soon learns no more: its noise hides what is left to learn.
@@ -265,8 +270,9 @@ def train(
         optimizer.param_groups[0]["lr"] = rate
         images, places, masks = pool.batch(rng, to)
         # Channels last are a fifth faster on a CPU.
-        said, drawn = network(images.contiguous(memory_format=torch.channels_last))
-        error = loss(said, drawn, places, masks)
+        with bfloat16(to):
+            said, drawn = network(images.contiguous(memory_format=torch.channels_last))
+        error = loss(said.float(), drawn.float(), places, masks)
         optimizer.zero_grad()
         error.backward()
         nn.utils.clip_grad_norm_(network.parameters(), 1.0)

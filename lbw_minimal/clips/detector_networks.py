@@ -13,7 +13,7 @@ from torch import nn
 
 from lbw_minimal.clips.drawn_shapes import SIZE
 
-WIDTH = 64  # channels
+WIDTH = 96  # channels
 CELLS = 42  # of the map, each way: a cell is two pixels wide
 SIGMA = 2.0  # pixels, of the Gaussian that the map is taught
 CUT = 0.05  # the chance that a place has nothing to do with that in the frame before
@@ -38,13 +38,13 @@ class Network(nn.Module):
         super().__init__()
         self.stem = nn.Sequential(
             nn.PixelUnshuffle(2),  # (B, 48, 42, 42)
-            nn.Conv2d(48, WIDTH, 3, 2, 1, bias=False),  # (B, 48, 21, 21)
+            nn.Conv2d(48, WIDTH, 3, 2, 1, bias=False),  # (B, 96, 21, 21)
             nn.GroupNorm(4, WIDTH),
             nn.ReLU(),
         )
         self.where = nn.Conv2d(2, WIDTH, 1, bias=False)  # a cell's coordinates as features
         # The dilations let every cell see most of the frame: where the arm comes from matters.
-        self.trunk = nn.Sequential(*map(_Residual, (1, 2, 4, 2, 1, 1)))
+        self.trunk = nn.Sequential(*map(_Residual, (1, 2, 4, 1, 2, 4, 2, 1)))
         self.maps = nn.Sequential(nn.Conv2d(WIDTH, 4 * 4, 1), nn.PixelShuffle(2))  # (B, 4, 42, 42)
         self.nowhere = nn.Linear(2 * WIDTH, 2)
 

@@ -46,7 +46,7 @@ class Clip(NamedTuple):
     masks: np.ndarray  # (T, 42, 42, 2) uint8
 
 
-class _Story(NamedTuple):
+class Story(NamedTuple):
     """What happens, before a camera sees it; places in pixels."""
 
     kind: str
@@ -93,7 +93,7 @@ def _story(rng, kind, T):
     before = -arm * rng.uniform(0.6, 1.0) if comes else rng.normal((-8, -16), 9)
     after = -arm * rng.uniform(0.1, 0.9) if rng.random() < 0.5 else rng.normal((-5, -12), 8)
     time = np.linspace(0, 1, T)[:, None]
-    begin, approach, move, retreat = _phases(rng, time)
+    begin, approach, move, retreat = phases(rng, time)
     slid = move
     if kind == "hit":  # the object slides on, slower and slower, and then rests
         slides = (1 - begin) * rng.uniform(0.1, 1)
@@ -105,11 +105,11 @@ def _story(rng, kind, T):
     tip = held + before * (1 - approach) + after * retreat
     lean = 1.0 if comes else rng.uniform(0, 0.4)
     shoulder = shoulder + lean * (tip - start - beside)
-    return _Story(kind, tip, shoulder, object_, half, start + way * (way[0] > 0))
+    return Story(kind, tip, shoulder, object_, half, start + way * (way[0] > 0))
 
 
-def _phases(rng, time):
-    """When the move begins, and how far approach, move and retreat are, 0 to 1."""
+def phases(rng: np.random.Generator, time: np.ndarray) -> tuple[np.ndarray, ...]:
+    """When the move begins, and how far approach, move and retreat are at each time, all 0 to 1."""
     seconds = PHASES * rng.uniform(0, 1, 7) + (0, 0.1, 0, 0.3, 0, 0.1, 0)
     rests = [0, 2, 4, 6]
     if rng.random() < 0.25:
@@ -130,8 +130,8 @@ def _phases(rng, time):
 # What there is to be seen
 
 
-def _room(rng, story):
-    """What stands still, (84, 84, 3) float32, and its colour where the object begins."""
+def a_room(rng: np.random.Generator, story: Story) -> tuple[np.ndarray, np.ndarray]:
+    """What stands still, (84, 84, 3) float32, and its colour (3,) where the object begins."""
     layer = draw.empty() + np.array([*a_colour(rng), 255]).astype(np.uint8)
     _clutter(rng, layer, rng.integers(0, rng.choice([7, 25], p=[0.8, 0.2])), (0, 0), (SIZE, 50))
     picture = layer[..., :3] * a_surface(rng, _strength(rng))
@@ -215,15 +215,15 @@ def _cabinet(rng, story, ground):
     return layer
 
 
-def _mark(rng, story):
-    """A spot where the object has to get to."""
+def a_mark(rng: np.random.Generator, story: Story) -> np.ndarray:
+    """A layer with the spot where the object has to get to."""
     layer, r = draw.empty(), rng.uniform(2, 7)
     at = story.object[-1] + rng.normal(0, 2, 2) + (0, story.half[1])
     draw.polygon(layer, at + ROUND * (r, r * rng.uniform(0.2, 1)), a_colour(rng))
     return layer
 
 
-def _bystander(rng, T) -> Draw:
+def a_bystander(rng: np.random.Generator, T: int) -> Draw:
     """Something that moves and has nothing to do with the arm, or somebody: a person behind."""
     at, swing, pace = rng.uniform(0, SIZE, 2), rng.normal(0, 20, 2), rng.uniform(2, 12)
     if rng.random() < 0.4:
@@ -256,13 +256,13 @@ def draw_clip(rng: np.random.Generator, T: int = FRAMES, kind: str | None = None
         # What is reached for stands where the hand gets to as often as where it comes by.
         still = story.object[-1:] if rng.random() < 0.5 else story.object[:1]
         story = story._replace(object=still.repeat(T, 0))
-    room, ground = _room(rng, story)
+    room, ground = a_room(rng, story)
     if rng.random() < 0.35:
-        room = draw.over(room, _mark(rng, story))
+        room = draw.over(room, a_mark(rng, story))
     if kind == "drawer":
         room = draw.over(room, _cabinet(rng, story, ground))
     object_ = _object(rng, story, ground) if moves or rng.random() < 0.5 else None
-    bystander = _bystander(rng, T) if rng.random() < 0.12 else None
+    bystander = a_bystander(rng, T) if rng.random() < 0.12 else None
     reach = np.linalg.norm(story.tip - story.shoulder, axis=1).max()
     person = draw.Person(rng, reach) if has_arm else None
     if person and rng.random() < 0.15:  # a sleeve that is hard to tell from the room
