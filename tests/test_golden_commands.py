@@ -164,6 +164,7 @@ def test_what_is_told_of_a_training_of_eyes(tmp_path, monkeypatch):
     told = eyes.learn(30, 4, tmp_path / "eyes.safetensors", "cpu")
     (how, saved), kept = asked, asked[0].pop("checkpoint")
     assert kept.path.as_posix() == "runs/eyes-4.checkpoint" and threads == [3]
+    assert how.pop("draw") is eyes.a_clip
     assert how == {"iterations": 30, "seed": 4, "device": "cpu", "workers": 1}
     assert saved == tmp_path / "eyes.safetensors"
     assert told.pop("machine") == f"a laptop, 4 cores, torch {torch.__version__}"
