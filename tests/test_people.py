@@ -3,17 +3,17 @@
 import numpy as np
 import pybullet as p
 import pytest
-from pybullet_utils.bullet_client import BulletClient
 
 from lbw_minimal.clips.drawn_shapes import HANDS
 from tasks.world.people import STRETCHED, Person, facing, hand, joined, limb
+from tasks.world.scene import silent_client
 
 GROUND = np.array([0.4, 0.4, 0.4])
 
 
 @pytest.fixture(scope="module")
 def client():
-    return BulletClient(connection_mode=p.DIRECT)
+    return silent_client()
 
 
 def matrix(quaternion):

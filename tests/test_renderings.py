@@ -6,6 +6,7 @@ import pytest
 from lbw_minimal.clips import drawn_camera
 from lbw_minimal.clips.drawings import FRAMES, STORIES
 from lbw_minimal.clips.drawn_shapes import SIZE
+from tasks.world import renderings
 from tasks.world.renderings import render_clip
 
 
@@ -72,3 +73,9 @@ def test_a_thing_behind_an_arm_is_nowhere(plain):
     """It is hidden in some clips, and seen in most."""
     share = [np.isfinite(clip.object[:, 0]).mean() for clip in clips("push", range(30))]
     assert 0 < np.mean(np.array(share) < 1) < 0.7
+
+
+def test_a_clip_is_made_without_a_word(capfd):
+    renderings._client.cache_clear()
+    render_clip(np.random.default_rng(0), T=2)
+    assert capfd.readouterr() == ("", "")

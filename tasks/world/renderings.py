@@ -20,7 +20,7 @@ from lbw_minimal.clips import drawn_shapes as draw
 from lbw_minimal.clips.drawings import FRAMES, STORIES, Clip
 from lbw_minimal.clips.drawn_shapes import SIZE, a_colour
 from tasks.world.people import Person
-from tasks.world.scene import BulletClient, numbers, pybullet
+from tasks.world.scene import numbers, silent_client
 
 BIG = 2 * SIZE  # pixels, as the tasks' frames: the renderer does not smooth edges
 HIDDEN = 0.3  # of what a clip shows of a thing at most: where less is seen, it is nowhere
@@ -216,7 +216,7 @@ def _put(p, parts, at):
 @functools.cache
 def _client():
     """One for all clips of a process."""
-    return BulletClient(connection_mode=pybullet.DIRECT)
+    return silent_client()
 
 
 def render_clip(rng: np.random.Generator, T: int = FRAMES, kind: str | None = None) -> Clip:

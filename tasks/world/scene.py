@@ -109,6 +109,12 @@ class Part(NamedTuple):
     solid: bool = True  # whether it can be touched
 
 
+def silent_client() -> BulletClient:
+    """A simulator of its own, without a window. PyBullet's greeting is kept from stdout."""
+    with _silence():
+        return BulletClient(connection_mode=pybullet.DIRECT)
+
+
 class World:
     """One PyBullet client with wall and table, its camera, and the shapes tasks are built from.
 
@@ -116,8 +122,7 @@ class World:
     """
 
     def __init__(self, embodiment: str, camera: tuple[tuple[float, float, float], float]):
-        with _silence():
-            self.p = BulletClient(connection_mode=pybullet.DIRECT)
+        self.p = silent_client()
         self.client = self.p._client  # PyBullet's number for it
         self.shapes = Shapes(self.client)  # of what moves
         self.scenery: list[int] = []
