@@ -1,4 +1,4 @@
-"""Drawings of an arm that moves a thing, in front of anything: what the detector learns from.
+"""Drawings of an arm that moves a thing, in front of anything, for the detector to learn from.
 
 Not from the paper. No two clips share their room, light, person, hand, tool, thing or way, so all
 that a detector can rely on is what they have in common: an arm reaches into the picture, its tip
