@@ -360,7 +360,7 @@ FROM_RIGHT = FROM_LEFT[:, :, ::-1]
 def test_the_detector_sees_an_arm_and_from_where(shown):
     for film, enters in ((FROM_LEFT, 0.05), (FROM_RIGHT, 0.95)):
         found = shown(film)
-        assert found.doubt is None and found.seen > 5 * arms.SEEN
+        assert found.doubt is None and found.seen > 0.7
         assert found.enters == pytest.approx(enters, abs=0.03)
 
 

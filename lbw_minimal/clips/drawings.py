@@ -95,9 +95,8 @@ def _story(rng, kind, T):
     time = np.linspace(0, 1, T)[:, None]
     begin, approach, move, retreat = phases(rng, time)
     slid = move
-    if kind == "hit":  # the object slides on, slower and slower, and then rests
-        slides = (1 - begin) * rng.uniform(0.1, 1)
-        slid = 1 - (1 - np.clip((time - begin) / slides, 0, 1)) ** 2
+    if kind == "hit":
+        slid = sliding(rng, begin, time)
         move = move * min(1.0, 4 / np.linalg.norm(way))
     bow = rng.uniform(0, 100) * (kind == "carry" and rng.random() < 0.3)  # lifted, put down again
     object_ = start + way * slid - np.array([0, bow]) * slid * (1 - slid)
@@ -125,6 +124,13 @@ def phases(rng: np.random.Generator, time: np.ndarray) -> tuple[np.ndarray, ...]
     begins = ends - seconds / seconds.sum()
     steps = (_ease((time - begins[i]) / (ends[i] - begins[i])) for i in (1, 3, 5))
     return begins[3], *steps
+
+
+def sliding(rng: np.random.Generator, begin: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """How far what is hit at `begin` has slid at each time, all 0 to 1: slower and slower, and then
+    it rests."""
+    slides = (1 - begin) * rng.uniform(0.1, 1)
+    return 1 - (1 - np.clip((time - begin) / slides, 0, 1)) ** 2
 
 
 # What there is to be seen

@@ -20,9 +20,9 @@ from lbw_minimal.clips import drawn_shapes as draw
 from lbw_minimal.clips.drawings import FRAMES, STORIES, Clip
 from lbw_minimal.clips.drawn_shapes import SIZE, a_colour
 from tasks.world.people import Person
-from tasks.world.scene import numbers, silent_client
+from tasks.world.scene import SUPERSAMPLE, numbers, silent_client
 
-BIG = 2 * SIZE  # pixels, as the tasks' frames: the renderer does not smooth edges
+BIG = SUPERSAMPLE * SIZE  # pixels
 HIDDEN = 0.3  # of what a clip shows of a thing at most: where less is seen, it is nowhere
 UNSEEN = 0.12  # of the stories with an arm: it is between the camera and the thing
 # Where shoulders are, from the place that the hand goes to, and how often: to the left, on the
@@ -86,8 +86,7 @@ def _story(rng, kind, T):
     begin, approach, move, retreat = drawings.phases(rng, time)
     slid = move
     if kind == "hit":
-        slides = (1 - begin) * rng.uniform(0.1, 1)
-        slid = 1 - (1 - np.clip((time - begin) / slides, 0, 1)) ** 2
+        slid = drawings.sliding(rng, begin, time)
         move = move * min(1.0, 0.04 / np.linalg.norm(way))
     bow = rng.uniform(0, 0.8) * (kind == "carry" and rng.random() < 0.5)
     path = start + way * slid + (0, 0, bow) * slid * (1 - slid)
