@@ -17,12 +17,12 @@ TOUCH, THERE, N = 20, 40, 50
 WAY = np.clip((np.arange(N) - TOUCH) / (THERE - TOUCH), 0, 1)
 
 
-def tracks(enters=np.nan, width=600):
+def tracks(enters=np.nan, width=600, yours=()):
     none = np.zeros(0)
-    return Tracks(none, none, none, none, none, 400, enters=enters, width=width)
+    return Tracks(none, none, none, none, none, 400, enters=enters, width=width, yours=yours)
 
 
-def pushed(along=(100.0, 0.0), tip=0.0, aside=0.0, enters=np.nan, width=600):
+def pushed(along=(100.0, 0.0), tip=0.0, aside=0.0, enters=np.nan, width=600, yours=()):
     """Check a way `along`, pixels, from 200 on; tip, aside (N,): how far the tip is ahead of the
     object, and the object to the right of its straight way, in parts of the way."""
     along = np.array(along)
@@ -30,7 +30,7 @@ def pushed(along=(100.0, 0.0), tip=0.0, aside=0.0, enters=np.nan, width=600):
     thing += np.multiply.outer(np.broadcast_to(aside, N), [-along[1], along[0]])
     hand = thing[0] + (WAY + tip)[:, None] * along
     ends = thing[0].copy(), thing[0] + along
-    check_way(tracks(enters, width), hand, thing, WAY, (TOUCH, THERE), ends)
+    return check_way(tracks(enters, width, yours), hand, thing, WAY, (TOUCH, THERE), ends)
 
 
 COMES = -0.1 - 2 * np.clip(1 - np.arange(N) / TOUCH, 0, 1)  # from behind, to a tenth of the way
@@ -47,9 +47,14 @@ def test_an_arm_that_comes_in_ahead_of_its_hand_pulls(door, along, pulls):
     pushed((along, 0), COMES, enters=door / 600, width=0)  # unknown
     if pulls:
         with pytest.raises(Unusable, match="which so pulls it"):
-            pushed((along, 0), COMES, enters=door / 600)
+            pushed((along, 0), COMES, enters=door / 600, yours=(("object", 0, 1),))
     else:
-        pushed((along, 0), COMES, enters=door / 600)
+        assert pushed((along, 0), COMES, enters=door / 600) == []
+    (warning,) = pushed((along, 0), COMES, enters=door / 600, yours=(("tip", 0, 1),)) or [""]
+    assert warning == pulls * (
+        "The object comes towards the arm, which so pulls it: it is pushed all the same, because "
+        "you placed the tip."
+    )
 
 
 @pytest.mark.parametrize(

@@ -174,7 +174,7 @@ def busiest_piece(tracks: Tracks, touched: bool, warnings: list[str]) -> Tracks:
     best = max(pieces, key=lambda piece: _extent(piece, "object" if touched else "tip"))
     if cuts:
         span = f"{best.times[0]:.1f} to {best.times[-1]:.1f} s"
-        warnings.append(f"{jumps(tracks)}: only the piece from {span} is used.")
+        warnings.append(f"{jumps(tracks)}: {span} is used; --from and --to choose another piece.")
     return best
 
 

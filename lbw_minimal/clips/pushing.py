@@ -55,8 +55,9 @@ def check_way(
     way: np.ndarray,
     steps: tuple[int, int],
     ends: tuple[np.ndarray, np.ndarray],
-) -> None:
-    """Raise Unusable where the object is not pushed: the scenes' arm can only push.
+) -> list[str]:
+    """Raise Unusable where the object is not pushed: the scenes' arm can only push. Returns a
+    warning where it is pushed only by a tip that the user placed.
 
     tracks: of the shot, which say where the arm comes in; tip, thing (N, 2) pixels; way (N,): how
     much of its way the object has gone, 0 to 1; steps: when it is touched, and there; ends: where
@@ -66,12 +67,14 @@ def check_way(
     along = end - start
     length = np.linalg.norm(along)
     door = (tracks.enters * tracks.width - tip[i, 0]) * np.sign(along[0])  # nan: no arm was seen
-    # A hand may hook a thing, so its tip says little; one that the user placed pushes from there.
-    if tracks.width and "tip" not in yours and door > PULLS * tracks.width:
-        raise Unusable(
-            "the object comes towards the arm, which so pulls it",
-            "push it away from the arm, with one hand, which is behind it",
-        )
+    warnings = []
+    if tracks.width and door > PULLS * tracks.width:
+        pulls = "the object comes towards the arm, which so pulls it"
+        # A hand may hook a thing, so its tip says little; one that the user placed pushes.
+        if "tip" not in yours:
+            raise Unusable(pulls, "push it away from the arm, with one hand, which is behind it")
+        said = f"{pulls.capitalize()}: it is pushed all the same"
+        warnings.append(f"{said}, because you placed the tip.")
     aside = (thing[i : j + 1] - start) @ (np.array([-along[1], along[0]]) / length**2)
     if np.abs(aside).max() > LIFTED:
         raise Unusable(
@@ -79,7 +82,7 @@ def check_way(
             "push it in a straight line, without lifting it",
         )
     if tracks.enters < SIDEWAYS or tracks.enters > 1 - SIDEWAYS:
-        return
+        return warnings
     ahead = (tip - start) @ along / length**2 - way  # (N,) of the way; the tip pushes from behind
     came = np.median(ahead[: max(1, i // 2)]) > AHEAD and ahead[i] > -RESTS
     if came or np.median(ahead[i : j + 1]) > AHEAD:
@@ -87,6 +90,7 @@ def check_way(
             "the object comes towards the arm, or the hand is in front of it",
             "push it away from the arm, with one hand, which is behind it",
         )
+    return warnings
 
 
 def check_view(tracks: Tracks) -> None:

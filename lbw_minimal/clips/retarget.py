@@ -131,7 +131,7 @@ def lay(tracks: Tracks, scene: Scene, mirror: bool | None = None) -> Motion:
     A = fit(start, end, scene, mirror)
     x = apply(A, tip)  # (N, 2) m
     if touched:
-        pushing.check_way(tracks, tip, thing, way, (i, j), (start, end))
+        warnings += pushing.check_way(tracks, tip, thing, way, (i, j), (start, end))
         pushing.check_hand(tracks, t[i : j + 1], thing[i : j + 1], end - start)
         if not scene.hit:  # a hit thing may go far while it is a blur
             pushing.check_steps(seen, start, end)

@@ -48,10 +48,10 @@ def _dot(colour, hollow=False, ring=None):
 
 LEGEND = f"""
 <p>{_dot(TIP)} Orange is the tip, the point that pushes: a fingertip, or the foot or end of what the
-hand holds. {_dot(OBJECT)} Sky blue is the object, the thing that is pushed. Of a full dot the
-network is sure, and may be wrong all the same: look at each. Of a hollow one {_dot(TIP, True)}
-{_dot(OBJECT, True)} it is not sure. "Yours" is where you clicked, and between your clicks. Grey
-pictures are not used.</p>
+hand holds. {_dot(OBJECT)} Sky blue is the object, the thing that is pushed; where none is, as
+in reach, it counts for nothing. Of a full dot the network is sure, and may be wrong all the same:
+look at each. Of a hollow one {_dot(TIP, True)} {_dot(OBJECT, True)} it is not sure. "Yours" is
+where you clicked, and between your clicks. Grey pictures are not used.</p>
 """
 CLICK = f"""
 <p>Is a dot wrong? Choose which, click where it should be, and run the command below.</p>

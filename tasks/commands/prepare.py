@@ -12,6 +12,7 @@ import shlex
 import sys
 import tempfile
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -99,6 +100,8 @@ def main(argv: list[str]) -> int:
         return 2
     make_folder(out)
     if result.why_not and args.file.resolve() != (out / FILM).resolve():
+        if (out / FILM).exists():
+            print(f"note: {out / FILM}, of an earlier try, is removed.", file=sys.stderr)
         for before in (FILM, STILLS):  # which nobody is to learn from by mistake
             (out / before).unlink(missing_ok=True)
     # The film's name is every clip's; a run bears the clip's.
@@ -127,8 +130,7 @@ def prepare(name: str, path: Path, choices: Choices | None = None) -> Prepared:
     choices = choices or Choices()
     clip = read_clip(path, start=choices.first or None, end=choices.last)
     clip = replace(clip, times=clip.times + clip.start)
-    env = tasks.bare(name, embodiment="human")
-    try:
+    with closing(tasks.bare(name, embodiment="human")) as env:
         first, _ = env.reset(seed=0)
         result = Prepared(clip, env.scene(), notes=[*clip.notes], warnings=[*clip.losses])
         if choices == Choices() and is_own(clip, first):
@@ -144,8 +146,6 @@ def prepare(name: str, path: Path, choices: Choices | None = None) -> Prepared:
                 result.warnings = [*clip.losses]  # no camera trembles there
             elif not result.motion and result.tracks and (said := jumps(result.tracks)):
                 result.warnings.append(f"{said}: only one piece of it counts.")
-    finally:
-        env.close()
     if result.motion:
         result.notes += result.motion.notes
         result.warnings += result.motion.warnings

@@ -95,7 +95,7 @@ pre > span { display: inline-block; max-width: 100%; overflow-wrap: anywhere }
 <ul>
 <li>Camera: to the side of the table, a little above it, and still. Lean it against something.</li>
 <li>Arm: one, from the left, or from above as it is drawn; bare or in a sleeve, with nothing else
-that moves in the picture.</li>
+that moves in the picture. If it comes from the right, push to the left: the clip is mirrored.</li>
 <li>Light: from the front, and enough of it. Hand, sleeve and object differ in colour from what is
 behind them.</li>
 <li>The outline is a help. A clip need not fit it exactly, but all of the way has to be in the
@@ -134,6 +134,7 @@ function none(why) {
 async function start(id) {
   if (!navigator.mediaDevices || !window.MediaRecorder)
     return none("This browser gives a page that is a file no camera. On a phone that is usual.");
+  state("starting", "Waiting for the camera. Allow it, if the browser asks.");
   if (stream) stream.getTracks().forEach(track => track.stop());
   const which = id ? {deviceId: {exact: id}} : {facingMode: "environment"};
   const size = {width: {ideal: 1280}, height: {ideal: 720}, frameRate: {ideal: 30}};
