@@ -1,5 +1,7 @@
 """People made of limbs: surfaces, where limbs are put, and what is drawn of whom."""
 
+import tracemalloc
+
 import numpy as np
 import pybullet as p
 import pytest
@@ -111,3 +113,16 @@ def test_people_differ_and_the_same_dice_make_the_same(client):
         one = person(client, seed)
         looks.append([client.getVisualShapeData(body)[0][7] for body in one.bodies])
     assert looks[0] == looks[1] and looks[2] != looks[1] != looks[3]
+
+
+def test_a_process_that_makes_many_people_keeps_none_of_them(client):
+    """PyBullet keeps the lists that meshes are made of: 30 people had left 11 MB behind."""
+    for seed in range(60):  # until no one is larger than all before
+        person(client, seed)
+    tracemalloc.start()
+    before = tracemalloc.get_traced_memory()[0]
+    for seed in range(30):
+        person(client, seed)
+    kept = tracemalloc.get_traced_memory()[0] - before
+    tracemalloc.stop()
+    assert kept < 500_000

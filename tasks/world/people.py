@@ -8,6 +8,7 @@ Lengths in metres; colours (3,) in 0-1.
 
 from __future__ import annotations
 
+from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -120,8 +121,9 @@ class Person:
 
     def _body(self, surface, colour):
         look = self.p.createVisualShape(
-            self.p.GEOM_MESH, vertices=surface.points.tolist(), normals=surface.normals.tolist(),
-            indices=surface.corners.tolist(), rgbaColor=(*colour, 1), specularColor=(0, 0, 0),
+            self.p.GEOM_MESH, vertices=_lent("points", surface.points),
+            normals=_lent("normals", surface.normals), indices=_lent("corners", surface.corners),
+            rgbaColor=(*colour, 1), specularColor=(0, 0, 0),
         )  # fmt: skip
         return self.p.createMultiBody(0, -1, look)
 
@@ -159,3 +161,21 @@ class Person:
 
     def _put(self, body, at, ahead, roll=0.0):
         self.p.resetBasePositionAndOrientation(body, at, facing(ahead, roll))
+
+
+def _lent(name, numbers):
+    """An array as a list that is the same object each time, and so are its rows: PyBullet never
+    lets go of those that a mesh is made of, which is 0.3 MB a person."""
+    lent, rows = _lists(name)
+    lent[:] = numbers.tolist()
+    if numbers.ndim > 1:
+        rows += [[] for _ in range(len(lent) - len(rows))]
+        for row, values in zip(rows, lent, strict=False):
+            row[:] = values
+        lent[:] = rows[: len(lent)]
+    return lent
+
+
+@cache
+def _lists(name):
+    return [], []
