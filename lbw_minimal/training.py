@@ -65,7 +65,8 @@ def write_atomic(path: Path | str, data: bytes | str) -> None:
     path = Path(path)
     part = path.with_name(f".{path.name}.part")
     with open(part, "wb") as f:
-        f.write(data.encode() if isinstance(data, str) else data)
+        # A file's name, which may stand in a text, need not be one.
+        f.write(data.encode(errors="backslashreplace") if isinstance(data, str) else data)
         f.flush()
         os.fsync(f.fileno())  # without it a power cut can rename an empty file into place
     os.replace(part, path)

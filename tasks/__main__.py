@@ -6,6 +6,8 @@
 
 from __future__ import annotations
 
+import io
+import os
 import sys
 from importlib import import_module
 
@@ -13,6 +15,8 @@ import tasks
 from lbw_minimal.cluster import INTERRUPTED
 from lbw_minimal.training import InputError
 from tasks.commands import COMMANDS
+
+PIPE_CLOSED = 141  # as a shell has it: 128 and SIGPIPE's number
 
 
 def overview() -> str:
@@ -37,15 +41,26 @@ def overview() -> str:
 
 def main(argv: list[str] | None = None) -> int:
     """Run a command line; returns its exit code: 2 for a mistake, named in a sentence on stderr,
-    130 if it was interrupted."""
-    name, *rest = (sys.argv[1:] if argv is None else argv) or ["--help"]
+    130 if it was interrupted, 141 if nobody reads what it prints."""
+    if isinstance(sys.stdout, io.TextIOWrapper):  # a terminal, or Windows, may not know a letter
+        sys.stdout.reconfigure(errors="backslashreplace")
+    try:
+        code = _run(*((sys.argv[1:] if argv is None else argv) or ["--help"]))
+        sys.stdout.flush()
+    except BrokenPipeError:  # who reads has had enough, as `head` has
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or Python says so at exit
+        return PIPE_CLOSED
+    return code
+
+
+def _run(name, *rest):
     try:
         if name in ("-h", "--help"):
             print(overview())
         elif name in tasks.TASKS:
-            import_module("tasks.commands.run").main(name, rest)
+            import_module("tasks.commands.run").main(name, [*rest])
         elif name in COMMANDS:
-            return import_module(f"tasks.commands.{name}").main(rest) or 0
+            return import_module(f"tasks.commands.{name}").main([*rest]) or 0
         else:
             there = ", ".join((*tasks.TASKS, *COMMANDS))
             raise InputError(f"{name}: there is no such task or command; choose one of {there}.")

@@ -129,7 +129,10 @@ def test_a_file_that_is_no_video_is_not_usable(tmp_path, capfd):
 
 def test_a_clip_of_too_few_pixels_is_not_usable(filmed, eyes, tmp_path):
     video.write(tmp_path / "tiny.mp4", video.read(filmed[0])[0][:, ::2, ::2], FPS, 1)
-    assert "42x42 pixels are too few" in prepare.prepare("push", tmp_path / "tiny.mp4").why_not
+    assert (
+        "42x42 pixels, as it is read, are too few"
+        in prepare.prepare("push", tmp_path / "tiny.mp4").why_not
+    )
 
 
 def test_a_missing_file_is_a_mistake(tmp_path, capfd):

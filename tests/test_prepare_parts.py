@@ -575,7 +575,7 @@ def test_84_pixels_are_enough_and_83_are_not(monkeypatch):
     )
     with pytest.raises(OSError):
         follow(prepared(clip=clip(height=84)), Choices())
-    with pytest.raises(Unusable, match="160x83 pixels are too few"):
+    with pytest.raises(Unusable, match="160x83 pixels, as it is read, are too few"):
         follow(prepared(clip=clip(height=83)), Choices())
     assert len(checked) == 1
 

@@ -28,6 +28,7 @@ NO_FILM = {
     b"....ftyphei": "this is a still picture; give a video in which the arm does the task.",
 }
 STILL = "this is a still picture; give a video in which the arm does the task."
+SOONER = 0, 10  # s before the place that was asked for, at which a file is entered
 ROUNDED = 0.01  # an editor that shrinks 16:9 to 1066x600 states pixels 1600:1599
 # With more threads a 4K film of 10 bits takes hundreds of megabytes for frames under way.
 THREADS = min(4, os.cpu_count() or 1)
@@ -71,8 +72,10 @@ def look(path: Path) -> tuple[list[Stream], dict[str, str]]:
                     "it as H.264 (mp4)."
                 )
             seconds = (container.duration or 0) / av.time_base
-            streams = [_describe(s, seconds) for s in known]
-            return [s for s in streams if s.width and s.height] or streams, dict(container.metadata)
+            streams = [s for s in (_describe(s, seconds) for s in known) if s.width and s.height]
+            if not streams:
+                raise InputError(f"{path}: the video is cut short or damaged; {AGAIN}.")
+            return streams, dict(container.metadata)
     except av.FFmpegError:
         raise InputError(f"{path}: {_why_closed(path)}") from None
     except OSError as error:
@@ -84,8 +87,9 @@ def look(path: Path) -> tuple[list[Stream], dict[str, str]]:
 
 def _open(file):
     """The container in an open file. A file's name never reaches FFmpeg's protocols and patterns,
-    for which a colon and a percent sign have meanings."""
-    return av.open(file, buffer_size=1 << 20, **ODD_TEXT)
+    for which a colon and a percent sign have meanings; and no playlist has it open anything else,
+    on this machine or another."""
+    return av.open(file, buffer_size=1 << 20, options={"protocol_whitelist": "none"}, **ODD_TEXT)
 
 
 def _describe(stream, seconds):
@@ -109,8 +113,9 @@ def _describe(stream, seconds):
 class Decoder:
     """Iterates over (time, frame) of a stream: seconds, or None without a time stamp.
 
-    start: seconds from the stream's start; the first frames may be earlier. sparse: only key
-    frames, at least a second apart. What could not be decoded is skipped and counted.
+    start: seconds from the stream's start; the first frames may be earlier, and without time
+    stamps they are those of the stream's start. sparse: only key frames, at least a second apart.
+    What could not be decoded is skipped and counted.
     """
 
     def __init__(self, path: Path, stream: Stream, start: float = 0.0, sparse: bool = False):
@@ -121,6 +126,21 @@ class Decoder:
         self._filter: tuple | None = None  # deinterlacing, and the shape that it is made for
 
     def __iter__(self) -> Iterator[tuple[float | None, av.VideoFrame]]:
+        """Raises InputError if the file can no longer be opened."""
+        if self.start > 0:
+            for sooner in SOONER:  # some files are entered behind the place that was asked for
+                frames = self._entered(max(0.0, self.start - sooner))
+                first = next(frames, None)
+                if first and first[0] is not None and first[0] <= self.start:
+                    yield first
+                    yield from frames
+                    return
+        yield from self._entered(None)
+
+    def _entered(self, at):
+        """All from a second on, or from the start; some of before that, and none if it fails."""
+        self.packets = self.bad = 0
+        self._filter = None
         with open(self.path, "rb") as file, _open(file) as container:
             stream = container.streams[self.stream.index]
             stream.codec_context.thread_type = "SLICE" if self.sparse else "AUTO"
@@ -128,8 +148,11 @@ class Decoder:
             if self.sparse:
                 stream.codec_context.skip_frame = "NONKEY"
             origin = (container.start_time or 0) / av.time_base
-            if self.start > 0:
-                container.seek(int((origin + self.start) * av.time_base))
+            if at is not None:
+                try:
+                    container.seek(int((origin + at) * av.time_base))
+                except av.FFmpegError:  # it can only be read from its start
+                    return
             self.promised = (container.duration or 0) / av.time_base
             if container.format.name.startswith("matroska"):  # it counts from 0, not from there
                 self.promised -= origin
@@ -210,14 +233,20 @@ def _deinterlacer(frame, stream):
     return graph
 
 
+def check_file(path: Path) -> None:
+    """Raises InputError if there is no file of that name, but a folder, a device or nothing."""
+    if os.path.isfile(path):  # a name may be too long to ask for, or its folder shut
+        return
+    if os.path.isdir(path):
+        raise InputError(f"{path}: this is a folder; give the video file itself.")
+    if os.path.exists(path):
+        raise InputError(f"{path}: this is a device, not a file; give the video file itself.")
+    raise InputError(f"{path}: there is no such file; check the path.")
+
+
 def _refuse_no_film(path):
     """What a look at the first bytes can tell, before FFmpeg takes text for a terminal's film."""
-    if path.is_dir():
-        raise InputError(f"{path}: this is a folder; give the video file itself.")
-    if not path.exists():
-        raise InputError(f"{path}: there is no such file; check the path.")
-    if not path.is_file():
-        raise InputError(f"{path}: this is a device, not a file; give the video file itself.")
+    check_file(path)
     try:
         with open(path, "rb") as f:
             head = f.read(HEAD)

@@ -21,6 +21,7 @@ LOOK_AT = 60  # frames that are looked at for this, spread over the film
 MOVED = 16
 MOVED_SHARE = 0.005  # 35 pixels: less is noise, or an object too small for a keypoint
 WIDTH = 112  # pixels, of the frames in which jumps are looked for
+TALLEST = 4 * WIDTH  # and no more high, whatever their shape
 NEAR = 0.25  # seconds: the motion before and after that says what is usual
 # How many times the usual residual makes a jump, up to 13 frames a second. Of 15 expert videos,
 # thinned to 25, 12.5 and 10 frames a second, with noise of 8 levels or none, only a puck that is
@@ -93,7 +94,7 @@ def jumps(frames: np.ndarray, times: np.ndarray) -> list[int]:
     """
     if len(frames) < 3:
         return []
-    size = WIDTH, max(8, round(frames.shape[1] * WIDTH / frames.shape[2]))
+    size = WIDTH, min(max(8, round(frames.shape[1] * WIDTH / frames.shape[2])), TALLEST)
     change, residual = _unexplained(frames, size)
     step, middle = np.diff(times), (times[1:] + times[:-1]) / 2
     change, residual = (x - np.percentile(x, 10) for x in (change, residual))  # what noise does

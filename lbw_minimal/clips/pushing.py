@@ -64,6 +64,10 @@ def check_way(
     its way begins and ends.
     """
     (i, j), (start, end), yours = steps, ends, {what for what, *_ in tracks.yours}
+    if i == len(way) - 1:
+        raise Unusable(
+            "the clip ends as the object begins to move", "film on until all is done and rests"
+        )
     along = end - start
     length = np.linalg.norm(along)
     door = (tracks.enters * tracks.width - tip[i, 0]) * np.sign(along[0])  # nan: no arm was seen

@@ -26,6 +26,8 @@ MOST = 200_000_000  # bytes of frames in memory: 46 s of a 16:9 film at RATE
 UNKNOWN = 3.0  # seconds in which a whole motion can hide
 AROUND = 1.0  # seconds kept before and after a motion
 CAPTURED = "com.android.capture.fps"  # how many frames a second the camera took, by Android
+FASTEST = 10_000  # of them; more is no camera's
+ALMOST = 1e-3  # s: a page rounds the times that it writes
 
 
 @dataclass(frozen=True)
@@ -67,6 +69,7 @@ def read_clip(
         its = streams[number - 1]
         first, last = (None if s is None else s * _slow(its, said) for s in (start, end))
         film = _Film(path, its, first, last, turn, crop)
+        film.slow = _slow(its, said)
         try:
             film.read()
         except InputError as error:
@@ -85,24 +88,28 @@ def read_clip(
         )
     times = _rising(best)
     keep = np.diff(times, prepend=times[0] - 1) > 0
-    slow = _slow(best.stream, said)
+    slow, stamped = best.slow, bool(best.start) and None not in best.stamps
+    begins = float(times[0]) if stamped else best.start
     frames, times = best.frames[keep], (times[keep] - times[0]) / slow
     if slow > 1:
         captured = float(said[CAPTURED])
         best.notes.append(f"Slow motion of {captured:g} frames a second was played at true speed.")
     if len(frames) < 2:
-        raise InputError(
-            f"{path}: the video has a single frame, a still picture; give one in which the arm "
-            "does the task."
-        )
+        still = "the video has a single frame, a still picture; give one in which the arm does the"
+        piece = "this piece of it has a single frame; give a longer one, in which the arm does the"
+        raise InputError(f"{path}: {piece if best.asked else still} task.")
     jumps = motion.jumps(frames, times) if cuts else []
-    return Clip(frames, times, jumps, best.notes, best.losses, best.start / slow)
+    return Clip(frames, times, jumps, best.notes, best.losses, begins / slow)
 
 
 def _slow(stream: Stream, said: dict[str, str]) -> float:
     """How many times as long the film takes as what it shows: 1 if it is no slow motion."""
-    captured = float(said.get(CAPTURED, 0))
-    return captured / stream.rate if captured >= 100 and captured > 2 * stream.rate else 1.0
+    try:
+        captured = float(said.get(CAPTURED, 0))
+    except ValueError:
+        return 1.0
+    slow = 100 <= captured <= FASTEST and captured > 2 * stream.rate
+    return captured / stream.rate if slow else 1.0
 
 
 def steady(clip: Clip) -> Clip:
@@ -130,6 +137,7 @@ class _Film:
 
     def __init__(self, path, stream: Stream, start, end, turn, crop):
         self.path, self.stream, self.turn, self.crop = path, stream, turn, crop
+        self.slow = 1.0  # see `_slow`
         self.asked = start is not None or end is not None
         self.start, self.end = start or 0.0, end
         self.notes, self.losses = list[str](), list[str]()
@@ -184,8 +192,8 @@ class _Film:
         if None in stamps or len(stamps) < 3:
             return ""
         times = np.array(stamps)
-        still = motion.high_pass(frames)
-        moving = np.flatnonzero(motion.differs(still[1:], still[:-1]))
+        pairs = (motion.high_pass(frames[i : i + 2]) for i in range(len(frames) - 1))  # for memory
+        moving = np.flatnonzero([motion.differs(*pair) for pair in pairs])
         if not len(moving):
             return ""
         apart = np.flatnonzero(times[moving[1:]] - times[moving[:-1] + 1] > UNKNOWN)
@@ -210,12 +218,14 @@ class _Film:
         self.frames = self.frames[:0]  # free what an earlier call has left
         decoder = Decoder(self.path, self.stream, self.start)
         upright = Upright(self.stream, self.turn, window)
-        kept, stamps, every, count, whole = [], [], 1, 0, True
+        kept, stamps, every, count, passed, whole = [], [], 1, 0, 0, True
         with self._bar("read") as bar:
             for time, frame in decoder:
-                if time is not None and time < self.start - 1e-6:
+                now = passed / self.stream.rate if time is None else time
+                passed += 1
+                if now < self.start - ALMOST:
                     continue
-                if self.end is not None and time is not None and time > self.end:
+                if self.end is not None and now > self.end + ALMOST:
                     whole = False
                     break
                 bar.update()
@@ -239,20 +249,21 @@ class _Film:
 
     def _check(self, decoder, count, whole):
         """Raises InputError if nothing came, or less than the file's header promises."""
+        if count == 0 and self.asked:
+            long = self.stream.seconds / self.slow
+            said = f"; it is {long:.1f} s long" * (long > 0)
+            raise InputError(f"{self.path}: the video has no frames in this piece{said}.")
         slack = max(0.05 * decoder.promised, 0.1 + 1 / self.stream.rate)
         if whole and decoder.covered < decoder.promised - slack:
             said = f"its header promises {decoder.promised:.1f} s and {decoder.covered:.1f} s can"
             raise InputError(f"{self.path}: the video is cut short, {said} be read; {AGAIN}.")
-        if count == 0 and decoder.packets and not self.asked:
+        if count == 0 and decoder.packets:
             raise InputError(
                 f"{self.path}: none of its pictures can be decoded, it is damaged or protected "
                 f"against copying; {AGAIN}, as H.264 (mp4)."
             )
         if count == 0:
-            where = (
-                " in this piece; choose another" if self.asked else "; record or export it again"
-            )
-            raise InputError(f"{self.path}: the video has no frames{where}.")
+            raise InputError(f"{self.path}: the video has no frames; record or export it again.")
 
 
 def _rising(film):
@@ -262,8 +273,9 @@ def _rising(film):
         times = np.array(film.stamps, np.float64)
         for i in np.flatnonzero(np.diff(times) < -UNKNOWN):  # recordings put one after another
             times[i + 1 :] += times[i] + step - times[i + 1]
+        least = 0.4 if (np.diff(times) >= 0).all() else 0.5  # some writers state each time twice
         times = np.sort(times)  # frames come in the order in which they are shown
-        if len(times) < 3 or (np.diff(times) > 0).mean() > 0.5:
+        if len(times) < 3 or (np.diff(times) > 0).mean() > least:
             return times
     film.losses.append(
         f"Its frames have no time stamps; {film.stream.rate:.3g} a second were assumed."

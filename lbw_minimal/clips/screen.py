@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from lbw_minimal.clips.motion import MOVED, MOVED_SHARE, some
+from lbw_minimal.clips.motion import MOVED, MOVED_SHARE, SMALL, some
 from lbw_minimal.clips.paths import Unusable
 
 # Of the picture. In 28 usable films of people one colour filled up to 0.41, in the kit's own films
@@ -26,6 +26,8 @@ BLACK = 16  # of 255: a dark room is as black before a camera
 
 def recorded(frames: np.ndarray) -> Unusable | None:
     """Why the clip is no film of a camera, and the remedy; None if it may be one."""
+    if min(frames.shape[1:3]) < SMALL:
+        return None  # that alone is wrong with it
     few = some(frames)[:, ::2, ::2]  # for speed; shrinking would mix colours
     share, what = float(np.median([_commonest(frame.reshape(-1, 3)) for frame in few])), ""
     if share < FILLS:

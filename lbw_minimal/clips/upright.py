@@ -79,7 +79,7 @@ class Upright:
             angle = math.radians(self.turn)
             a, b = math.cos(angle), math.sin(angle)
             c, d = -b, a
-        elif data := frame.side_data.get("DISPLAYMATRIX"):
+        elif data := _matrix(frame):
             a, b, c, d = np.frombuffer(data, np.int32)[[0, 1, 3, 4]].tolist()
         else:
             a, b, c, d = 1, 0, 0, 1
@@ -114,6 +114,13 @@ class Upright:
     def _note(self, sentence):
         if sentence not in self.notes:
             self.notes.append(sentence)
+
+
+def _matrix(frame):
+    try:
+        return frame.side_data.get("DISPLAYMATRIX")
+    except ValueError:  # side data that PyAV has no name for, such as a camera's Exif
+        return None
 
 
 def borders(frames: np.ndarray) -> tuple[float, float, float, float] | None:

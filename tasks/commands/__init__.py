@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import tempfile
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
@@ -144,9 +145,10 @@ metres = within(0, MOST_JITTER, f"length from 0 to {MOST_JITTER} m")
 
 
 def make_folder(out: Path) -> None:
-    """Make the folder `out`. Raises InputError where that is impossible."""
+    """Make the folder `out`. Raises InputError where that is impossible, or it is read-only."""
     try:
         out.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=out).close()
     except OSError as error:
         raise InputError(
             f"{out}: cannot write there ({error.strerror}); give another --out."

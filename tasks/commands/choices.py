@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,6 +12,7 @@ from lbw_minimal.clips.upright import SIDE
 from lbw_minimal.training import InputError, quantity
 from tasks.commands import Parser, within
 
+MOST_SECONDS = 1e6  # eleven days: no clip is longer
 SLACK = 0.01  # s: the page rounds times to 0.001
 WHERE = (
     "X and Y pixels from the left and the upper edge of the picture as it was read, at most "
@@ -111,8 +111,14 @@ def parser() -> Parser:
     return p
 
 
+def open_ended(argv: list[str], file: Path) -> list[str]:
+    """The arguments without a "--", so that a click can add options behind them."""
+    named = f"./{file}" if str(file).startswith("-") else str(file)
+    return [named if a == str(file) else a for a in argv if a != "--"]
+
+
 # a type for argparse
-seconds = within(0, sys.float_info.max, "time in seconds from 0 on")
+seconds = within(0, MOST_SECONDS, "time in seconds from 0 on")
 
 
 def mark(text: str) -> Mark:

@@ -8,6 +8,7 @@ import os
 from html import escape
 from itertools import chain, count
 from pathlib import Path
+from urllib.parse import quote
 
 import tasks
 
@@ -93,7 +94,7 @@ def links(page: Path, runs: Path = RUNS) -> str:
             continue
         if there.exists() and here.is_relative_to(runs):
             way = Path(os.path.relpath(there, here.parent)).as_posix()
-            items.append(f'<a href="{escape(way)}">{escape(name)}</a>')
+            items.append(f'<a href="{quote(way)}">{escape(name)}</a>')
         elif command:
             items.append(f"<span>{name}: <code>{command}</code></span>")
     return f'<nav aria-label="The kit\'s other pages">{"".join(items)}</nav>\n'

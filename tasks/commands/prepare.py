@@ -23,6 +23,7 @@ import tasks
 from lbw_minimal import imitate, video
 from lbw_minimal.clips import arms, footage, light, screen, vanished
 from lbw_minimal.clips.behind import behind
+from lbw_minimal.clips.decoding import check_file
 from lbw_minimal.clips.detector import Detector, Found, refine
 from lbw_minimal.clips.hiding import unlike
 from lbw_minimal.clips.motion import small, some
@@ -39,7 +40,7 @@ from lbw_minimal.pictures import spread
 from lbw_minimal.report import COLUMNS
 from lbw_minimal.training import InputError, write_atomic
 from tasks.commands import make_folder
-from tasks.commands.choices import Choices, Misplaced, parser
+from tasks.commands.choices import Choices, Misplaced, open_ended, parser
 from tasks.commands.links import FILM, NOTE, RUNS, folder, links, note_of, noted
 from tasks.world.reenact import Reenactment, reenact
 
@@ -47,7 +48,7 @@ PAGE = "prepare.html"
 STILLS = "stills.webp"  # of a clip that was re-enacted, for the report of a run
 SHOWN = 60  # frames of the page's film, which are translated as well: 4 s of work on one core
 OWN = 12  # grey levels: the kit's own films begin with the scene's picture to within 6 of 256
-OWN_STEP = 0.05  # s between frames: a film that is slower has to be interpolated, as a motion
+OWN_STEP, OWN_LONGEST = 0.05, 60.0  # s between frames, or it is interpolated, and in all
 EYES = tasks.WEIGHTS / "eyes" / "eyes.safetensors"  # the detector of tip and object
 
 
@@ -87,10 +88,8 @@ def main(argv: list[str]) -> int:
     Raises InputError for a mistake in the arguments.
     """
     args = parser().read(argv)
-    if not args.file.is_file():
-        raise InputError(f"{args.file}: there is no such file; check the path.")
+    check_file(args.file)
     choices = Choices(args.first, args.last, args.mirror, tuple(args.tip), tuple(args.object))
-    out = args.out or folder(args.task, args.file, RUNS / "prepare")
     try:
         result = prepare(args.task, args.file, choices)
     except Misplaced:  # a mistake of the command, not the clip's: its page stays
@@ -98,6 +97,7 @@ def main(argv: list[str]) -> int:
     except InputError as error:  # no picture to show
         print(f"not usable: {error}")
         return 2
+    out = args.out or folder(args.task, args.file, RUNS / "prepare")
     make_folder(out)
     if result.why_not and args.file.resolve() != (out / FILM).resolve():
         if (out / FILM).exists():
@@ -107,7 +107,7 @@ def main(argv: list[str]) -> int:
     # The film's name is every clip's; a run bears the clip's.
     named = ["--video", str(out / FILM), "--out", str(folder(args.task, args.file))]
     learn = shlex.join(["python", "-m", "tasks", args.task, *named])
-    command = shlex.join(["python", "-m", "tasks", "prepare", *argv])
+    command = shlex.join(["python", "-m", "tasks", "prepare", *open_ended(argv, args.file)])
     note = note_of(args.file, args.task, command) | {"corrections": str(choices)}
     page = write(out, args.task, result, note, "" if result.why_not else learn)
     print(f"{result.verdict}\npage: {page}")
@@ -182,8 +182,9 @@ def follow(result: Prepared, choices: Choices) -> Motion:
     clip, frames = result.clip, result.clip.frames
     height, width = frames.shape[1:3]
     if min(height, width) < video.SIZE:
+        few = f"{width}x{height} pixels, as it is read, are too few"
         raise Unusable(
-            f"{width}x{height} pixels are too few", f"film at {video.SIZE}x{video.SIZE} or more"
+            few, f"film at {video.SIZE}x{video.SIZE} or more, less long or flat than 3:1"
         )
     choices.check(clip)
     seen = footage.check(frames, clip.cuts)
@@ -277,12 +278,10 @@ def stills(result: Prepared) -> np.ndarray:
 
 
 def is_own(clip: Clip, first: np.ndarray) -> bool:
-    """Whether the clip begins with the frame `first` (84, 84, 3), as the kit's own films do.
-
-    Such a film is what a re-enactment would be, and needs none.
-    """
+    """Whether the clip begins with the frame `first` (84, 84, 3), as the kit's own films do: such
+    a one is what a re-enactment would be."""
     h, w = clip.frames.shape[1:3]
-    if h != w or np.median(np.diff(clip.times)) > OWN_STEP:
+    if h != w or np.median(np.diff(clip.times)) > OWN_STEP or np.ptp(clip.times) > OWN_LONGEST:
         return False
     off = np.abs(small(clip.frames[0]).astype(int) - first)
     return bool(np.percentile(off, 99) < OWN)
