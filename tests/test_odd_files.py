@@ -239,7 +239,7 @@ def test_a_letter_that_the_terminal_does_not_know_ends_nothing(monkeypatch):
     assert out.buffer.getvalue().endswith(b"\\U0001f44b.mp4" + os.linesep.encode())
 
 
-@pytest.mark.skipif(os.name == "nt", reason="Windows tells a closed pipe otherwise")
+@pytest.mark.skipif(os.name == "nt", reason="needs a pipe that tells who reads it has gone")
 def test_who_has_read_enough_is_told_nothing_more():
     line = [sys.executable, "-m", "tasks", "--help"]
     asked = subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=tasks.ROOT)

@@ -280,7 +280,7 @@ def test_a_page_leads_to_the_runs_on_clips_which_bear_any_name(tmp_path):
         (tmp_path / name).touch()
     for page in ("gallery/index.html", "push-d/report.html"):
         said = links.links(tmp_path / page, tmp_path)
-        way = '<a href="../push-a &amp; b/report.html">a run on a clip: push-a &amp; b</a>'
+        way = '<a href="../push-a%20%26%20b/report.html">a run on a clip: push-a &amp; b</a>'
         assert re.findall("<a href.*?</a>", said) == [way]  # the other clip's run is not done
     itself = links.links(tmp_path / "push-a & b" / "report.html", tmp_path)
     assert re.findall('href="([^"]+)"', itself) == ["prepare.html"]
