@@ -45,7 +45,7 @@ def main(argv: list[str] | None = None) -> int:
     if isinstance(sys.stdout, io.TextIOWrapper):  # a terminal, or Windows, may not know a letter
         sys.stdout.reconfigure(errors="backslashreplace")
     try:
-        code = _run(*((sys.argv[1:] if argv is None else argv) or ["--help"]))
+        code = _run((sys.argv[1:] if argv is None else argv) or ["--help"])
         sys.stdout.flush()
     except BrokenPipeError:  # who reads has had enough, as `head` has
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or Python says so at exit
@@ -53,14 +53,15 @@ def main(argv: list[str] | None = None) -> int:
     return code
 
 
-def _run(name, *rest):
+def _run(argv):
+    name, *rest = argv
     try:
         if name in ("-h", "--help"):
             print(overview())
         elif name in tasks.TASKS:
-            import_module("tasks.commands.run").main(name, [*rest])
+            import_module("tasks.commands.run").main(name, rest)
         elif name in COMMANDS:
-            return import_module(f"tasks.commands.{name}").main([*rest]) or 0
+            return import_module(f"tasks.commands.{name}").main(rest) or 0
         else:
             there = ", ".join((*tasks.TASKS, *COMMANDS))
             raise InputError(f"{name}: there is no such task or command; choose one of {there}.")

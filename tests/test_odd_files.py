@@ -16,14 +16,11 @@ import pytest
 import tasks
 from lbw_minimal.clips import motion, reader, screen
 from lbw_minimal.clips.decoding import Decoder, check_file, look
-from lbw_minimal.clips.paths import Unusable
-from lbw_minimal.clips.pushing import check_way
 from lbw_minimal.clips.reader import read_clip
 from lbw_minimal.clips.upright import Upright
 from lbw_minimal.training import InputError, write_atomic
 from tasks.__main__ import PIPE_CLOSED, main
 from tasks.commands import choices, links, make_folder
-from tests.test_pushing import tracks
 from tests.toy_clips import encode, reach
 
 
@@ -165,13 +162,6 @@ def test_a_strip_is_looked_at_for_jumps_and_told_by_its_shape_alone():
     assert screen.recorded(one) is None and screen.recorded(one.repeat(84, 1).repeat(84, 2))
 
 
-def test_an_object_that_moves_with_the_last_picture_is_not_done():
-    way = np.r_[np.zeros(9), 1.0]
-    thing = way[:, None] * (100, 0)
-    with pytest.raises(Unusable, match="ends as the object begins to move"):
-        check_way(tracks(), thing - (30, 0), thing, way, (9, 9), (thing[0], thing[-1]))
-
-
 @pytest.mark.parametrize(
     ("path", "said"),
     [
@@ -185,7 +175,7 @@ def test_what_is_no_file_is_called_what_it_is(path, said):
 
 
 @pytest.mark.parametrize("text", ["1e13", "1e308", "inf", "nan", "-1"])
-def test_seconds_are_those_of_a_clip(text, capsys):
+def test_seconds_are_those_of_a_clip(text):
     with pytest.raises(InputError, match="is no time in seconds from 0 on"):
         choices.parser().read(["push", "a.mp4", "--from", text])
 

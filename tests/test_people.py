@@ -116,7 +116,7 @@ def test_people_differ_and_the_same_dice_make_the_same(client):
 
 
 def test_a_process_that_makes_many_people_keeps_none_of_them(client):
-    """PyBullet keeps the lists that meshes are made of: 30 people had left 11 MB behind."""
+    """PyBullet keeps the lists that meshes are made of: 30 people had left 9 MB behind."""
     for seed in range(60):  # until no one is larger than all before
         person(client, seed)
     tracemalloc.start()

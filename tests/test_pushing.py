@@ -57,6 +57,13 @@ def test_an_arm_that_comes_in_ahead_of_its_hand_pulls(door, along, pulls):
     )
 
 
+def test_an_object_that_moves_with_the_last_picture_is_not_done():
+    way = np.r_[np.zeros(9), 1.0]
+    thing = way[:, None] * (100, 0)
+    with pytest.raises(Unusable, match="ends as the object begins to move"):
+        check_way(tracks(), thing - (30, 0), thing, way, (9, 9), (thing[0], thing[-1]))
+
+
 @pytest.mark.parametrize(
     ("nearer", "down", "hand"), [(24, 0.3, True), (26, 0.3, False), (0, 0.3, True), (0, 0.2, False)]
 )

@@ -21,7 +21,7 @@ LOOK_AT = 60  # frames that are looked at for this, spread over the film
 MOVED = 16
 MOVED_SHARE = 0.005  # 35 pixels: less is noise, or an object too small for a keypoint
 WIDTH = 112  # pixels, of the frames in which jumps are looked for
-TALLEST = 4 * WIDTH  # and no more high, whatever their shape
+TALLEST = 4 * WIDTH  # pixels, of their height: of a strip they are squeezed
 NEAR = 0.25  # seconds: the motion before and after that says what is usual
 # How many times the usual residual makes a jump, up to 13 frames a second. Of 15 expert videos,
 # thinned to 25, 12.5 and 10 frames a second, with noise of 8 levels or none, only a puck that is

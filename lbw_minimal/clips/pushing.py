@@ -21,6 +21,7 @@ from lbw_minimal.clips.paths import (
     median3,
 )
 
+FILM_ON = "film on until all is done and rests"
 LIFTED = 0.2  # of its way: what leaves the straight line by more was picked up
 AHEAD = 0.25  # of its way: a tip so far in front of the object does not push it
 # Of its way, in the middle: where fingers are about a thing their tip was found up to 0.16 ahead of
@@ -65,9 +66,7 @@ def check_way(
     """
     (i, j), (start, end), yours = steps, ends, {what for what, *_ in tracks.yours}
     if i == len(way) - 1:
-        raise Unusable(
-            "the clip ends as the object begins to move", "film on until all is done and rests"
-        )
+        raise Unusable("the clip ends as the object begins to move", FILM_ON)
     along = end - start
     length = np.linalg.norm(along)
     door = (tracks.enters * tracks.width - tip[i, 0]) * np.sign(along[0])  # nan: no arm was seen

@@ -67,9 +67,10 @@ def read_clip(
     best, rank, failed = None, (False, 0), list[InputError]()
     for number in range(1, len(streams) + 1) if stream is None else [stream]:
         its = streams[number - 1]
-        first, last = (None if s is None else s * _slow(its, said) for s in (start, end))
+        slow = _slow(its, said)
+        first, last = (None if s is None else s * slow for s in (start, end))
         film = _Film(path, its, first, last, turn, crop)
-        film.slow = _slow(its, said)
+        film.slow = slow
         try:
             film.read()
         except InputError as error:
@@ -192,8 +193,8 @@ class _Film:
         if None in stamps or len(stamps) < 3:
             return ""
         times = np.array(stamps)
-        pairs = (motion.high_pass(frames[i : i + 2]) for i in range(len(frames) - 1))  # for memory
-        moving = np.flatnonzero([motion.differs(*pair) for pair in pairs])
+        still = (motion.high_pass(frame[None])[0] for frame in frames)  # two in memory at a time
+        moving = np.flatnonzero([motion.differs(*pair) for pair in pairwise(still)])
         if not len(moving):
             return ""
         apart = np.flatnonzero(times[moving[1:]] - times[moving[:-1] + 1] > UNKNOWN)

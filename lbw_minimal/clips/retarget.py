@@ -115,7 +115,7 @@ def lay(tracks: Tracks, scene: Scene, mirror: bool | None = None) -> Motion:
         if gone < LITTLE * tracks.side:
             raise Unusable(
                 f"the clip ends {gone:.0f} pixels on its way, while the {what} still gets faster",
-                "film on until all is done and rests",
+                pushing.FILM_ON,
             )
         warnings.append(f"The clip ends while the {what} still gets faster: was it not done yet?")
     if gone < LEAST_WAY * tracks.side:

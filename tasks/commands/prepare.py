@@ -48,7 +48,8 @@ PAGE = "prepare.html"
 STILLS = "stills.webp"  # of a clip that was re-enacted, for the report of a run
 SHOWN = 60  # frames of the page's film, which are translated as well: 4 s of work on one core
 OWN = 12  # grey levels: the kit's own films begin with the scene's picture to within 6 of 256
-OWN_STEP, OWN_LONGEST = 0.05, 60.0  # s between frames, or it is interpolated, and in all
+# s at most between frames, or it has to be interpolated, as a motion, and from first to last.
+OWN_STEP, OWN_LONGEST = 0.05, 60.0
 EYES = tasks.WEIGHTS / "eyes" / "eyes.safetensors"  # the detector of tip and object
 
 
