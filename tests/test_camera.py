@@ -5,14 +5,16 @@ import numpy as np
 import pytest
 
 from lbw_minimal.clips import camera
+from tests.strange_cameras import ease
 from tests.toy_clips import arm, room
 
 H, W, T = 180, 240, 20
 
 
-def through(views, height=2 * H, width=2 * W):
-    """What a camera sees of a large room: views (T, 2, 3) from its pixels to the room's."""
-    picture = cv2.GaussianBlur(room(height, width), (0, 0), 1)
+def through(views, picture=None):
+    """What a camera sees of a large room, or picture: views (T, 2, 3) from its pixels to that."""
+    if picture is None:
+        picture = cv2.GaussianBlur(room(2 * H, 2 * W), (0, 0), 1)
     how = cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
     return np.stack([cv2.warpAffine(picture, view, (W, H), flags=how) for view in views])
 
@@ -66,6 +68,32 @@ def test_a_pan_is_followed_behind_a_large_thing_that_goes_another_way():
         frame[50:140, 20 + 4 * t : 140 + 4 * t] = thing
     sways = camera.sway(frames)
     np.testing.assert_allclose(sways[-1], [[1, 0, x[-1]], [0, 1, 0]], atol=1.2)
+
+
+def test_a_pan_along_tiles_is_followed_where_an_arm_covers_half_of_them():
+    """A tile is a fifteenth of the width, and each has its own shade; the arm goes the other way.
+    Laid over the first frame alone, one in the middle of the pan slips by some tiles."""
+    rng = np.random.default_rng(0)
+    tiles = 130 + np.kron(rng.normal(0, 12, (23, 30)), np.ones((16, 16)))[: 2 * H]
+    y, x = np.mgrid[: 2 * H, : 2 * W] % 16
+    tiles[(y < 3) | (x < 3)] = 70
+    picture = np.repeat(np.clip(tiles, 0, 255).astype(np.uint8)[..., None], 3, axis=2)
+    x = W / 4 * ease(np.linspace(0, 1, 14))
+    frames = through(shifted(x), cv2.GaussianBlur(picture, (0, 0), 1))
+    frames = np.clip(frames + rng.normal(0, 10, frames.shape), 0, 255).astype(np.uint8)
+    for frame, share in zip(frames, np.linspace(0.1, 0.8, len(x)), strict=True):
+        frame[: H // 2, : round(W * share)] = (220, 170, 140)
+    alone, _ = camera._followed(frames, np.inf)
+    assert camera.extent(alone[:, :2], H, W) < 0.15
+    assert camera.extent(camera.sway(frames), H, W) == pytest.approx(0.25, abs=0.02)
+
+
+@pytest.mark.parametrize(("right", "said"), [(0, False), (1, True)])
+def test_of_two_ways_the_first_frame_bears_out_the_one_that_is_right(right, said):
+    frames = through(shifted(np.arange(8.0)))
+    ways = [np.stack([np.eye(3)] * 8) for _ in range(2)]
+    ways[right][:, 0, 2] = -np.arange(8.0)
+    assert camera._bears_out(frames, *ways) == said
 
 
 def test_light_that_flickers_moves_nothing():
@@ -168,7 +196,7 @@ def test_a_cell_of_a_twelfth_votes_where_a_tenth_speaks_for_one_side():
     picture = camera._Picture(still, 200)
     both = np.where(np.arange(W)[None, :, None] < W // 2, moved, still)
     there = np.array([[1, 0, -8], [0, 1, 0], [0, 0, 1.0]])
-    votes = picture.votes(camera._plain(both, picture.size), there)
+    votes = picture.votes(camera._plain(both, picture.size), there, np.eye(3))
     assert votes.shape == (9, 12)
     assert (votes[:, 1:5] >= 0).mean() > 0.9 and (votes[:, 1:5] > 0).mean() > 0.2
     assert (votes[:, 7:] == 0).mean() < 0.8 and (votes[:, 7:] <= 0).all()
@@ -183,7 +211,7 @@ def test_a_tenth_more_unlike_is_a_vote(unlike, vote, monkeypatch):
     for given, said in ((offs, vote), (offs[::-1], -vote)):
         given = iter(given)
         monkeypatch.setattr(camera._Picture, "_off", lambda *_, g=given: next(g))
-        assert (picture.votes(picture.plain, np.eye(3)) == said).all()
+        assert (picture.votes(picture.plain, np.eye(3), np.eye(3)) == said).all()
 
 
 def test_the_extent_is_that_of_all_frames_and_not_of_the_last():
