@@ -285,6 +285,16 @@ def test_a_hand_inside_whose_sleeve_is_not_seen_is_another_if_it_is_sure(hand, s
 
 
 @pytest.mark.parametrize(
+    ("hand", "seen"),
+    [((39, 10, 3, 8, 0.9), 1), ((39, 10, 3, 8, 0.79), 0), ((39, 3, 3, 8, 0.9), 0),
+     ((39, 4, 3, 8, 0.9), 1)],
+)  # fmt: skip
+def test_a_sure_hand_at_a_side_edge_is_another_and_what_hangs_from_above_is_not(hand, seen):
+    """Three cells of it are seen, so it does not reach in far. The first arm itself rests."""
+    assert beside(FIRST, hand, still=[FIRST]) == seen
+
+
+@pytest.mark.parametrize(
     ("other", "share", "seen"),
     [(SECOND, 4 / 12, 1), (SECOND, 3 / 12, 0), (HAND, 4 / 12, 1), (HAND, 3 / 12, 0)],
 )

@@ -156,8 +156,8 @@ def _moves_beside(arm, other, moved):
     if max(other.left - arm.right, arm.left - other.right) < APART:
         return False
     mine, its = (moved[one.cells].mean() for one in (arm, other))
-    inside = other.plain and not other.door.any()  # a hand whose sleeve looks like the room
-    return its > MOVES and (inside or (other.comes and mine > MOVES))
+    hand = other.plain and not other.high  # its sleeve looks like the room, or is outside
+    return its > MOVES and (hand or (other.comes and mine > MOVES))
 
 
 def _large(found):
@@ -185,6 +185,7 @@ class _Piece(NamedTuple):
     door: np.ndarray  # (h, w) bool: its cells near the edges over which it may come in
     comes: bool  # whether it comes in over one and reaches in
     plain: bool  # whether it is surely an arm
+    high: bool  # whether it is near the upper edge, as what hangs there
 
     @property
     def whole(self) -> bool:
@@ -207,7 +208,8 @@ def _pieces(mask, lower=False):
         door = piece & (inside < NEAR)
         comes = bool(door.any() and inside[piece].max() >= REACHES * door.sum() / NEAR)
         comes &= not (lower and others[piece].min() < NEAR)
-        yield _Piece(piece, left, left + width, door, comes, bool(mask[piece].max() >= PLAIN))
+        plain, high = bool(mask[piece].max() >= PLAIN), bool(y[piece].min() < NEAR)
+        yield _Piece(piece, left, left + width, door, comes, plain, high)
 
 
 def _comes_in(moves):

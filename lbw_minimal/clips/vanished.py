@@ -25,9 +25,9 @@ STOOD = 1.5  # times: what stood has sharper edges than the ground that it leave
 COVERED = 0.5  # of the thing's pixels that have changed: then it has left
 MOVED = 0.4  # of the pixels where it is looked for that have changed
 # How unlike the most alike half of a thing is, times how unlike that is the ground it left, in a
-# quarter of the frames: of 24 usable things it was 0.34 at most, of seven hidden ones in eleven
-# 0.46 or more. A hand that pushes covers a half.
-UNLIKE, OFTEN = 0.4, 0.25
+# quarter of the frames: of 24 usable things it was 0.34 at most, of 16 hidden ones in ten it was
+# 0.40 or more. A hand that pushes covers a half.
+UNLIKE, OFTEN = 0.37, 0.25
 FOLLOWED = 0.8  # correlation, in half of the frames: then its way is known
 PASSES = 6  # frames in which an arm is at its place: of hidden things it was there in 11 or more
 BESIDE = 16  # pixels of the small frames, a tenth of the picture: what is nearer may be the hand
