@@ -65,6 +65,26 @@ def test_an_arm_is_large_sure_and_reaches_in_over_an_edge(piece, seen):
     assert told(piece).seen == seen
 
 
+@pytest.mark.parametrize(
+    ("piece", "inside"),
+    [
+        ((20, 10, 4, 5, 0.8), 1), ((20, 10, 19, 1, 0.9), 0), ((20, 10, 4, 5, 0.79), 0),
+        ((20, 4, 4, 5, 0.9), 1), ((20, 3, 4, 5, 0.9), 0), ((0, 8, 4, 16, 0.9), 0),
+    ],
+)  # fmt: skip
+def test_a_large_sure_hand_inside_is_an_arm_whose_sleeve_is_not_seen(piece, inside):
+    found = told(piece)
+    assert found.inside == inside
+    if not found.seen:
+        assert (found.doubt is None) == bool(inside)
+
+
+def test_a_hand_inside_is_seen_in_a_tenth_of_the_frames():
+    hand = mask((20, 10, 4, 5, 0.9))
+    assert count(*[hand] * 10, *[mask()] * 90).doubt is None
+    assert "no arm" in count(*[hand] * 9, *[mask()] * 91).doubt[0]
+
+
 BELOW = 20, 20, 4, 12, 0.9
 
 

@@ -32,6 +32,25 @@ def test_a_dark_clip_is_called_dark():
     assert said.startswith(" The picture is dark, 2") and said.endswith("more light would help.")
 
 
+@pytest.mark.parametrize(
+    ("brightest", "gain"), [(160, 1), (159, 235 / 159), (47, 5), (20, 8), (0, 8)]
+)
+def test_a_dark_clip_is_made_so_bright_that_its_lightest_pixels_are_nearly_white(brightest, gain):
+    """Two in a hundred of its pixels are so bright, in one colour; the others are black."""
+    frames = np.zeros((5, 10, 20, 3), np.uint8)
+    frames[:, :3, 0, 1] = frames[:, :3, 1, 2] = frames[:, :3, 2, 0] = brightest
+    assert light.gain(frames) == pytest.approx(gain)
+    bright = light.brightened(frames, light.gain(frames))
+    assert bright.dtype == np.uint8 and bright.max() == round(brightest * gain)
+    assert (light.brightened(frames, 30.0)[:, :3, 0, 1] == min(255, 30 * brightest)).all()
+
+
+def test_a_clip_that_was_made_brighter_is_called_dark_by_the_light_it_was_filmed_in():
+    frames = film(60) // 5
+    bright = light.brightened(frames, 5.0)
+    assert "dark, 2" in light.poor(bright, times=5.0) and light.poor(bright) == ""
+
+
 @pytest.mark.parametrize("more", [18, -18, (0, 18, 0)])
 def test_an_arm_like_what_is_behind_it_is_said_with_what_helps(more):
     said = light.poor(film(more))

@@ -12,6 +12,7 @@ from lbw_minimal.clips import page
 from lbw_minimal.clips.arms import Arms
 from lbw_minimal.clips.detector import Found
 from lbw_minimal.clips.footage import Footage
+from lbw_minimal.clips.lookalike import look_alike
 from lbw_minimal.clips.page import write_page
 from lbw_minimal.clips.paths import Unusable
 from lbw_minimal.clips.reader import Clip, read_clip
@@ -116,6 +117,18 @@ def test_a_refused_clip_says_whether_it_is_dark_or_its_arm_like_the_room(
     result = prepare.prepare("push", path)
     poor = [words for words in ("dark", "Something large comes in") if words in result.why_not]
     assert result.why_not and poor == [said] * bool(said)
+
+
+def test_a_clip_in_a_tenth_of_the_light_is_usable(tmp_path):
+    """In it no pixel moves by as much as by day; its page says what was done."""
+    env = bare("coffee", embodiment="human")
+    clip = look_alike(*record_expert(env, 3)[:2])
+    env.close()
+    noise = np.random.default_rng(0).normal(0, 2, clip.frames.shape)
+    dark = np.clip(0.1 * clip.frames + noise, 0, 255).astype(np.uint8)
+    result = prepare.prepare("coffee", encode(tmp_path / "a.mp4", dark, options={"crf": "20"}))
+    assert result.verdict.startswith("usable")
+    assert "It is dark, and was made 8.0 times as bright." in result.notes
 
 
 def test_a_file_that_is_no_video_is_not_usable(tmp_path, capfd):
@@ -295,7 +308,7 @@ def test_the_kits_own_film_begins_with_the_scenes_picture_in_99_of_100_pixels(of
 def test_what_was_found_is_laid_by_the_clips_shorter_side_cuts_and_marks(monkeypatch):
     laid = {}
     n = 6
-    clip = Clip(np.zeros((n, 90, 160, 3), np.uint8), 2 + np.arange(n) / 20, [4], [])
+    clip = Clip(np.full((n, 90, 160, 3), 200, np.uint8), 2 + np.arange(n) / 20, [4], [])
     nothing = Found(np.zeros((n, 2)), np.zeros((n, 2)), np.zeros(n), np.zeros(n))
     touches = []
     monkeypatch.setattr(prepare, "look", lambda *asked: touches.append(asked[3]) or nothing)

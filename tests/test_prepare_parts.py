@@ -542,10 +542,14 @@ def test_a_refused_clip_is_told_what_is_poor_about_its_light(light, monkeypatch)
         "check",
         lambda frames, cuts: Footage(frames, [], slice(2, 6), None, True, still),
     )
-    monkeypatch.setattr(prepare.light, "poor", lambda *what: asked.append(what) or light)
+    monkeypatch.setattr(
+        prepare.light,
+        "poor",
+        lambda frames, sure=None, times=1: asked.append((frames, sure)) or light,
+    )
     result = prepare.prepare("push", "a.mp4")
     assert result.why_not == f"nothing moves; record it all.{light}"
-    assert [len(frames) for (frames,) in asked] == [4]
+    assert [len(frames) for frames, _ in asked] == [4]
     found = Found(np.zeros((6, 2)), np.zeros((6, 2)), np.arange(6), np.zeros(6))
     monkeypatch.setattr(prepare, "coming_in", lambda sight, off: ONE)
     monkeypatch.setattr(prepare, "look", lambda sights, frames, cuts, touched: found)

@@ -63,6 +63,7 @@ class Arms(NamedTuple):
     below: float = 0.0  # share of the frames in which one comes in over the lower edge alone
     beside: float = 0.0  # share of the frames in which another moves, see `beside`
     room: float = 0.0  # of what was steadied: by how much the room still moves, see `room`
+    inside: float = 0.0  # share of the frames in which they show one that reaches to no edge
 
     @property
     def doubt(self) -> tuple[str, str] | None:
@@ -73,7 +74,8 @@ class Arms(NamedTuple):
                 "the arm comes in over the lower edge, as from the camera, and hides what it is at",
                 SIDE_ON,
             )
-        if self.seen < SEEN and not self.moves:
+        # They may not show a sleeve; where there was no arm at all, they showed none inside either.
+        if max(self.seen, self.inside) < SEEN and not self.moves:
             return "no arm is seen, nothing large that moves comes in from the edge", SIDE_ON
         if self.several < SEVERAL and self.room >= ROOM:
             return CAMERA
@@ -102,6 +104,7 @@ def count(masks: np.ndarray, off: np.ndarray) -> Arms:
         moves=_comes_in(off > FAINT),
         across=float((np.nan_to_num(np.ptp(doors, axis=1)) >= ACROSS).mean()),
         below=sum(map(bool, lower)) / len(masks),
+        inside=sum(map(_inside, masks)) / len(masks),
     )
 
 
@@ -160,6 +163,11 @@ def _moves_beside(arm, other, moved):
     return its > MOVES and (hand or (other.comes and mine > MOVES))
 
 
+def _inside(mask):
+    """Whether a mask (h, w) shows a large arm that reaches to no edge from which it may come."""
+    return any(one.large and not one.door.any() for one in _pieces(mask))
+
+
 def _large(found):
     """The arms of each frame; none where not one of them all is large."""
     return found if max((arm[2] for one in found for arm in one), default=0) >= MOST else []
@@ -190,7 +198,12 @@ class _Piece(NamedTuple):
     @property
     def whole(self) -> bool:
         """Whether it is all of an arm, if it has the tip."""
-        return bool(self.plain and self.comes and self.cells.sum() >= MOST)
+        return bool(self.comes and self.large)
+
+    @property
+    def large(self) -> bool:
+        """Whether it is surely an arm, and as large as one."""
+        return bool(self.plain and self.cells.sum() >= MOST)
 
 
 def _pieces(mask, lower=False):

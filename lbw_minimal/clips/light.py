@@ -1,8 +1,10 @@
-"""Whether a clip is too dark, or its arm too like what is behind it, for the arm to be found.
+"""Whether a clip is dark, or its arm too like what is behind it, for the arm to be found.
 
-In: frames (T, H, W, 3) uint8 of a camera that stands. No clip is refused for this: it says better
-why one that is refused shows no arm, or why the dots are wrong. An arm is taken to be what comes in
-over an edge and is as large as one, if it differs from the room by more than noise does.
+In: frames (T, H, W, 3) uint8. Dark ones are made brighter before anything is searched in them: the
+detector was taught by day, and what moves is told by grey levels. No clip is refused for its light:
+it says better why one that is refused shows no arm, or why the dots are wrong. An arm is taken to
+be what comes in over an edge and is as large as one, if it differs from the room by more than noise
+does.
 """
 
 from __future__ import annotations
@@ -15,6 +17,12 @@ from lbw_minimal.clips.footage import at_edge, things
 from lbw_minimal.clips.motion import SMALL, small, some
 from lbw_minimal.clips.paths import FOUND, SURE
 
+# Grey levels that one in a hundred of a clip's values has, in one of its colours: below the first a
+# clip is dark, and is made so bright that it has the second. With half of their light tips in 19
+# made clips are surely right in 74 % of the frames and surely wrong in 9, with three tenths in 72
+# and 13; so brightened in 78 and 6 to 7, as with all of it.
+DIM, BRIGHT = 160, 235
+MOST_GAIN = 8.0  # times: noise gets as much brighter
 # Grey levels, the median over a clip. In 175 clips, of strangers and an outsider, the kit's and the
 # authors', it was 44 or more. With a quarter of the light two had 23, and the thing was lost in
 # one; with an eighth, 10, nothing was seen to move in either.
@@ -29,14 +37,27 @@ NOISE = 4.0  # deviations
 MOST = 0.9
 
 
-def poor(frames: np.ndarray, sure: np.ndarray | None = None) -> str:
-    """A sentence on what is poor in the light or the colours of frames (T, H, W, 3) uint8, and what
-    helps, with a space before it; "" if nothing is.
+def gain(frames: np.ndarray) -> float:
+    """How many times brighter frames (T, H, W, 3) uint8 have to be; 1 if they are not dark."""
+    bright = float(np.percentile(some(frames), 99))
+    return min(MOST_GAIN, BRIGHT / max(1.0, bright)) if bright < DIM else 1.0
+
+
+def brightened(frames: np.ndarray, times: float) -> np.ndarray:
+    """Frames (T, H, W, 3) uint8 so many times as bright, and white where that is too bright."""
+    levels = np.minimum(255, times * np.arange(256)).round().astype(np.uint8)
+    return frames if times == 1 else levels[frames]
+
+
+def poor(frames: np.ndarray, sure: np.ndarray | None = None, times: float = 1.0) -> str:
+    """A sentence on what is poor in the light or the colours of frames (T, H, W, 3) uint8 of a
+    camera that stands, and what helps, with a space before it; "" if nothing is.
 
     sure (T,): how surely the tip was found in them, if it was searched. Where it mostly was found,
-    an arm was told from the room.
+    an arm was told from the room. times: how many times brighter they were made.
     """
     bright, differs = measured(frames)
+    bright /= times
     if bright < DARK:
         return f" The picture is dark, {bright:.0f} of 255 grey levels: more light would help."
     found = sure is not None and (sure >= SURE).mean() >= FOUND

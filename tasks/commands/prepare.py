@@ -180,25 +180,25 @@ def follow(result: Prepared, choices: Choices) -> Motion:
 
     Raises Unusable if that cannot be done, and Misplaced.
     """
-    clip, frames = result.clip, result.clip.frames
-    height, width = frames.shape[1:3]
+    clip, (height, width) = result.clip, result.clip.frames.shape[1:3]
     if min(height, width) < video.SIZE:
         few = f"{width}x{height} pixels, as it is read, are too few"
-        raise Unusable(
-            few, f"film at {video.SIZE}x{video.SIZE} or more, less long or flat than 3:1"
-        )
+        enough = f"film at {video.SIZE}x{video.SIZE} or more, less long or flat than 3:1"
+        raise Unusable(few, enough)
     choices.check(clip)
-    seen = footage.check(frames, clip.cuts)
+    times = light.gain(clip.frames)
+    seen = footage.check(light.brightened(clip.frames, times), clip.cuts)
     frames = seen.frames
     result.clip, result.warnings = replace(clip, frames=frames), result.warnings + seen.warnings
-    result.light = partial(light.poor, frames[seen.shot])
+    result.notes += [f"It is dark, and was made {times:.1f} times as bright."] * (times > 1)
+    result.light = partial(light.poor, frames[seen.shot], times=times)
     sights = shots(Detector.load(EYES), frames, clip.cuts)
     longest = sights[[0, *clip.cuts].index(seen.shot.start)]
     arm = coming_in(longest, seen.off)
     if seen.still and arm.seen < arms.SEEN:
         raise Unusable(*(footage.ONLY_SMALL if longest.vanished else seen.still))
     found = look(sights, frames, clip.cuts, result.scene.contact is not None)
-    result.light = partial(light.poor, frames[seen.shot], found.tip_sure[seen.shot])
+    result.light = partial(result.light, sure=found.tip_sure[seen.shot])
     tracks = Tracks(
         clip.times, found.tip, found.object, found.tip_sure, found.object_sure,
         min(height, width), tuple(clip.cuts), arm.enters, seen.unmoved, width=width,
