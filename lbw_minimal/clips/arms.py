@@ -160,7 +160,8 @@ def _moves_beside(arm, other, moved):
         return False
     mine, its = (moved[one.cells].mean() for one in (arm, other))
     hand = other.plain and not other.high  # its sleeve looks like the room, or is outside
-    return its > MOVES and (hand or (other.comes and mine > MOVES))
+    faint = other.comes and other.cells.sum() >= MOST  # a picture at the edge is less than one
+    return its > MOVES and (hand or (faint and mine > MOVES))
 
 
 def _inside(mask):
