@@ -69,11 +69,15 @@ def test_listed_faults_were_noticed_as_often_as_their_tables_say():
 
 def test_policies_from_strangers_clips_succeed_as_often_as_the_page_says():
     runs = read("own_arm/strangers.json")
-    now = [r for r in runs if r["clips"] == 42 and "--set" not in r["command"]]
-    assert len(now) == 20 and min(r["success"] for r in now) == 49
-    assert sum(r["made"] == "painted" for r in now) == 9
-    assert sum(r["task"] == "slide" for r in now) == 4
-    before = [r for r in runs if r["clips"] == 32]
-    assert len(before) == 11 and all(r["success"] == 50 for r in before)
+    now = [r for r in runs if r["clips"] == 120]
+    assert len(now) == 20 and sum(r["success"] >= 45 for r in now) == 19
+    assert sum(r["success"] == 50 for r in now) == 18
+    assert [r["success"] for r in now if r["task"] == "slide"] == [47, 41, 50]
+    before = [r for r in runs if r["clips"] == 42 and "--set" not in r["command"]]
+    assert len(before) == 20 and min(r["success"] for r in before) == 49
+    assert sum(r["made"] == "painted" for r in before) == 9
+    assert sum(r["task"] == "slide" for r in before) == 4
+    earlier = [r for r in runs if r["clips"] == 32]
+    assert len(earlier) == 11 and all(r["success"] == 50 for r in earlier)
     said = " ".join(PAGE.split())
-    assert "[20 of 20 runs]" in said and "[11 of 11 runs]" in said
+    assert all(f"[{n} runs]" in said for n in ("19 of 20", "20 of 20", "11 of 11"))
