@@ -45,8 +45,11 @@ def gain(frames: np.ndarray) -> float:
 
 def brightened(frames: np.ndarray, times: float) -> np.ndarray:
     """Frames (T, H, W, 3) uint8 so many times as bright, and white where that is too bright."""
+    if times == 1:
+        return frames
     levels = np.minimum(255, times * np.arange(256)).round().astype(np.uint8)
-    return frames if times == 1 else levels[frames]
+    flat = frames.reshape(len(frames), -1)  # indices of NumPy's take eight times the memory
+    return cv2.LUT(flat, levels).reshape(frames.shape)
 
 
 def poor(frames: np.ndarray, sure: np.ndarray | None = None, times: float = 1.0) -> str:
