@@ -44,7 +44,7 @@ def test_a_cell_votes_for_what_it_is_more_like():
     after[:, W // 2 :] = before[:, W // 2 :]
     there = np.array([[1.0, 0, -8], [0, 1, 0], [0, 0, 1]])
     picture = camera._Picture(before, camera.FINE)
-    said = picture.votes(camera._plain(after, picture.size), there)
+    said = picture.votes(camera._plain(after, picture.size), there, np.eye(3))
     assert said.shape == (6, 12)
     assert (said[:, 1:5] > 0).mean() > 0.9 and (said[:, 7:] < 0).mean() > 0.9
 

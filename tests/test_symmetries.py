@@ -271,7 +271,7 @@ def test_a_larger_picture_moves_by_more_pixels_and_is_asked_by_as_many_cells():
     for shape in ((120, 160), (160, 120), (90, 240)):
         wall = cv2.resize(frames[0], shape[::-1])
         picture = camera._Picture(wall, camera.FINE)
-        votes = picture.votes(camera._plain(wall, picture.size), np.eye(3))
+        votes = picture.votes(camera._plain(wall, picture.size), np.eye(3), np.eye(3))
         larger, smaller = max(shape), min(shape)
         cells = camera.CELLS, round(camera.CELLS * smaller / larger)
         assert votes.shape == (cells if shape[0] == larger else cells[::-1]) and not votes.any()
