@@ -280,7 +280,7 @@ def test_a_faint_arm_that_moves_beside_one_with_the_tip_is_another():
         ((FIRST, (11, 0, 4, 12, 0.7)), (6, 11), 0.5, False),  # three cells between them
         ((FIRST, (20, 0, 4, 5, 0.7)), (6, 11), 0.5, True),  # 20 cells
         ((FIRST, (20, 0, 19, 1, 0.7)), (6, 11), 0.5, False),  # 19
-        (((4, 0, 4, 5, 0.9), SECOND), (6, 4), 0.5, True),
+        (((4, 0, 4, 5, 0.9), SECOND), (6, 4), 0.5, True),  # 20 cells
         (((4, 0, 19, 1, 0.9), (30, 0, 4, 12, 0.7)), (6, 1), 0.5, False),  # 19
         (((4, 4, 4, 12, 0.9), SECOND), (6, 11), 0.5, False),  # it comes from nowhere
     ],

@@ -299,7 +299,9 @@ def test_arms_come_in_where_they_did(golden):
             x, y = rng.integers(0, 36), rng.integers(0, 4)
             mask[y : y + rng.integers(4, 24), x : x + rng.integers(2, 9)] = rng.uniform(0.4, 1)
         mask[10 : 10 + t % 7, : t % 11] = 0.9
-    figures = {str(t): np.ravel(arms._coming_in(mask)) for t, mask in enumerate(masks)}
+    figures = {
+        str(t): np.ravel(arms._coming_in(arms._pieces(mask))) for t, mask in enumerate(masks)
+    }
     off = 6.0 * np.stack([cv2.resize(mask, (84, 84)) for mask in masks]) ** 3 * 4
     parts = [arms.count(masks[t : t + 10], off[t : t + 10]) for t in range(0, 40, 5)]
     golden(figures | {"count": np.ravel(parts)})

@@ -74,7 +74,7 @@ class Arms(NamedTuple):
                 "the arm comes in over the lower edge, as from the camera, and hides what it is at",
                 SIDE_ON,
             )
-        # They may not show a sleeve; where there was no arm at all, they showed none inside either.
+        # Masks may not show a sleeve; where there was no arm, they showed none inside either.
         if max(self.seen, self.inside) < SEEN and not self.moves:
             return "no arm is seen, nothing large that moves comes in from the edge", SIDE_ON
         if self.several < SEVERAL and self.room >= ROOM:
@@ -90,8 +90,9 @@ class Arms(NamedTuple):
 
 def count(masks: np.ndarray, off: np.ndarray) -> Arms:
     """The arms in masks (n, h, w), and in what is `off` the room, (T, 84, 84) grey levels."""
-    found = _large([_coming_in(mask) for mask in masks])
-    lower = _large([_coming_in(mask, lower=True) for mask in masks])
+    pieces = [list(_pieces(mask)) for mask in masks]
+    found = _large([_coming_in(some) for some in pieces])
+    lower = _large([_coming_in(_pieces(mask, lower=True)) for mask in masks])
     several = [any(b[0] - a[1] >= APART for a, b in pairwise(sorted(one))) for one in found]
     places = [max(one, key=lambda arm: arm[2])[3] for one in found if one]
     doors = _doors(off > MOVED)
@@ -104,7 +105,7 @@ def count(masks: np.ndarray, off: np.ndarray) -> Arms:
         moves=_comes_in(off > FAINT),
         across=float((np.nan_to_num(np.ptp(doors, axis=1)) >= ACROSS).mean()),
         below=sum(map(bool, lower)) / len(masks),
-        inside=sum(map(_inside, masks)) / len(masks),
+        inside=sum(map(_inside, pieces)) / len(masks),
     )
 
 
@@ -164,9 +165,9 @@ def _moves_beside(arm, other, moved):
     return its > MOVES and (hand or (faint and mine > MOVES))
 
 
-def _inside(mask):
-    """Whether a mask (h, w) shows a large arm that reaches to no edge from which it may come."""
-    return any(one.large and not one.door.any() for one in _pieces(mask))
+def _inside(pieces):
+    """Whether one of the pieces is a large arm that reaches to no edge from which it may come."""
+    return any(one.large and not one.door.any() for one in pieces)
 
 
 def _large(found):
@@ -174,15 +175,20 @@ def _large(found):
     return found if max((arm[2] for one in found for arm in one), default=0) >= MOST else []
 
 
-def _coming_in(mask, lower=False):
-    """First and last column, cells, and place at the edge, 0 to 1, of each arm in a mask (h, w),
-    that comes in over the left, right or upper edge; lower: over the lower one alone."""
-    x = (np.arange(mask.shape[1]) + 0.5)[None] / mask.shape[1] + 0 * mask
+def _coming_in(pieces):
+    """First and last column, cells, and place at the edge, 0 to 1, of each arm among the pieces of
+    a mask that comes in."""
     return [
-        (one.left, one.right, int(one.cells.sum()), float(x[one.door].mean()))
-        for one in _pieces(mask, lower)
+        (one.left, one.right, int(one.cells.sum()), _column(one.door))
+        for one in pieces
         if one.plain and one.comes
     ]
+
+
+def _column(cells):
+    """The mean column of cells (h, w) bool, 0 at the left edge, 1 at the right."""
+    width = cells.shape[1]
+    return float(((np.nonzero(cells)[1] + 0.5) / width).mean())
 
 
 class _Piece(NamedTuple):
@@ -194,7 +200,11 @@ class _Piece(NamedTuple):
     door: np.ndarray  # (h, w) bool: its cells near the edges over which it may come in
     comes: bool  # whether it comes in over one and reaches in
     plain: bool  # whether it is surely an arm
-    high: bool  # whether it is near the upper edge, as what hangs there
+
+    @property
+    def high(self) -> bool:
+        """Whether it is near the upper edge, as what hangs there."""
+        return bool(self.cells[:NEAR].any())
 
     @property
     def whole(self) -> bool:
@@ -208,7 +218,8 @@ class _Piece(NamedTuple):
 
 
 def _pieces(mask, lower=False):
-    """The pieces of a mask (h, w), but for the smallest."""
+    """The pieces of a mask (h, w), but for the smallest. They may come in over the left, right or
+    upper edge; lower: over the lower one alone."""
     h, w = mask.shape
     x, y = np.meshgrid(np.arange(w) + 0.5, np.arange(h) + 0.5)
     others = np.minimum(np.minimum(x, w - x), y)  # cells from the nearest edge
@@ -222,8 +233,7 @@ def _pieces(mask, lower=False):
         door = piece & (inside < NEAR)
         comes = bool(door.any() and inside[piece].max() >= REACHES * door.sum() / NEAR)
         comes &= not (lower and others[piece].min() < NEAR)
-        plain, high = bool(mask[piece].max() >= PLAIN), bool(y[piece].min() < NEAR)
-        yield _Piece(piece, left, left + width, door, comes, plain, high)
+        yield _Piece(piece, left, left + width, door, comes, bool(mask[piece].max() >= PLAIN))
 
 
 def _comes_in(moves):
