@@ -147,6 +147,19 @@ def test_a_camera_trembles_from_a_two_hundredth_of_the_picture_on_and_moves_from
         assert ("steadied" in "".join(footage.check(film).warnings)) == (verdict == "trembles")
 
 
+@pytest.mark.parametrize(("way", "moves"), [(0.109, False), (0.111, True)])
+def test_an_upright_pictures_camera_moves_by_a_ninth_of_its_width(room, way, moves, monkeypatch):
+    """Which is less of its longer side, as a camera has it."""
+    upright = np.rot90(arms(room, "left"), axes=(1, 2))
+    height, width = upright.shape[1:3]
+    monkeypatch.setattr(footage.camera, "extent", lambda *_: way * width / height)
+    if moves:
+        with pytest.raises(Unusable, match="the camera moves"):
+            footage.check(upright)
+    else:
+        assert "steadied" in footage.check(upright).warnings[0]
+
+
 @pytest.mark.parametrize("longest", ["first", "last"])
 def test_it_is_the_longest_shots_camera_that_counts_and_all_shots_are_steadied(
     room, longest, monkeypatch

@@ -201,7 +201,7 @@ def test_a_clip_is_searched_with_its_marks_and_its_shorter_side_as_it_was(monkey
     result = prepare.Prepared(clip, scene, warnings=["read"])
     marks = Choices(tip=((30.0, 40.0, 1.2), (50.0, 60.0, 1.5)), object=((90.0, 60.0, 2.0),))
     prepare.follow(result, marks)
-    (tracks, scene, mirror), = laid  # fmt: skip
+    (tracks, scene, mirror, _), = laid  # fmt: skip
     golden(
         {"marked": [*tracks.tip[4], *tracks.tip[10], *tracks.object[20]],
          "else": [*tracks.tip[-1], *tracks.object[0], *tracks.tip_sure[[4, -1]]],

@@ -326,7 +326,7 @@ def test_what_was_found_is_laid_by_the_clips_shorter_side_cuts_and_marks(monkeyp
     monkeypatch.setattr(
         prepare,
         "lay",
-        lambda *asked: laid.update(zip(("tracks", "scene", "mirror"), asked, strict=True)),
+        lambda *asked: laid.update(zip(("tracks", "scene", "mirror", "alike"), asked, strict=True)),
     )
     scene, reach = SimpleNamespace(contact=0.04), SimpleNamespace(contact=None)
     result = Prepared(clip, scene)
@@ -338,6 +338,7 @@ def test_what_was_found_is_laid_by_the_clips_shorter_side_cuts_and_marks(monkeyp
     assert (tracks.enters, tracks.unmoved, shots) == (0.2, True, [4])
     assert result.warnings == ["cut at [4]"] and result.tracks is tracks
     assert result.notes[0] == "You placed the tip in 1 picture and the object in 1 picture."
+    assert laid["alike"].args[0] is result.clip.frames and laid["alike"].args[1] is tracks
     assert result.notes[1].startswith("6 frames at 20 a second")
     for wrong in ((161.0, 20.0, 2.1), (10.0, 91.0, 2.1), (10.0, 20.0, 1.9), (10.0, 20.0, 2.3)):
         with pytest.raises(prepare.Misplaced, match=r"of 160x90 pixels and 2\.0 to 2\.2 s"):

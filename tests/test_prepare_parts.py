@@ -376,7 +376,7 @@ def test_a_mark_lies_in_the_picture_and_in_the_clips_seconds(mark, inside, monke
     monkeypatch.setattr(
         prepare.footage, "check", lambda frames, cuts: Footage(frames, [], slice(0, 6), None, False)
     )
-    monkeypatch.setattr(prepare, "lay", lambda tracks, scene, mirror: "laid")
+    monkeypatch.setattr(prepare, "lay", lambda tracks, scene, mirror, alike: "laid")
     for name in ("tip", "object"):
         result, choices = prepared(clip=clip(start=2.0)), Choices(**{name: (mark,)})
         if inside:
@@ -403,7 +403,7 @@ def test_a_thing_that_is_touched_should_be_in_sight_unless_the_user_placed_it(
         prepare.footage, "check", lambda frames, cuts: Footage(frames, [], slice(0, 6), None, False)
     )
     monkeypatch.setattr(prepare.vanished, "check_seen", lambda *what: looked.append(what))
-    monkeypatch.setattr(prepare, "lay", lambda tracks, scene, mirror: motion)
+    monkeypatch.setattr(prepare, "lay", lambda tracks, scene, mirror, alike: motion)
     monkeypatch.setattr(
         prepare, "behind", lambda tracks, *of: put.append(of) or ("put behind", of[0])
     )
@@ -449,7 +449,7 @@ def test_a_user_who_places_the_tip_overrules_that_there_is_no_arm(name, monkeypa
     monkeypatch.setattr(
         prepare.footage, "check", lambda frames, cuts: Footage(frames, [], slice(0, 6), None, False)
     )
-    monkeypatch.setattr(prepare, "lay", lambda tracks, scene, mirror: "laid")
+    monkeypatch.setattr(prepare, "lay", lambda tracks, scene, mirror, alike: "laid")
     result = prepared()
     choices = Choices(**({name: ((5.0, 5.0, 0.1),)} if name else {}))
     if name == "tip":
@@ -476,7 +476,7 @@ def test_where_nothing_seems_to_move_an_arm_that_is_seen_does(arms, refused, mon
         "check",
         lambda frames, cuts: Footage(frames, [], slice(0, 6), None, True, still),
     )
-    monkeypatch.setattr(prepare, "lay", lambda tracks, scene, mirror: "laid")
+    monkeypatch.setattr(prepare, "lay", lambda tracks, scene, mirror, alike: "laid")
     result, marks = prepared(), Choices(tip=((5.0, 5.0, 0.1),))
     if refused:  # and no mark helps, so nothing is searched for
         with pytest.raises(Unusable, match=r"^nothing moves; film an arm\.$"):
@@ -500,7 +500,7 @@ def test_an_arm_that_moves_beside_the_one_with_the_tip_is_another_person(share, 
     monkeypatch.setattr(
         prepare.footage, "check", lambda frames, cuts: Footage(frames, [], slice(2, 6), off, False)
     )
-    monkeypatch.setattr(prepare, "lay", lambda tracks, scene, mirror: "laid")
+    monkeypatch.setattr(prepare, "lay", lambda tracks, scene, mirror, alike: "laid")
     result = prepared(clip=replace(clip(), cuts=[2]))
     if two:
         with pytest.raises(Unusable, match="as of several people"):
@@ -521,7 +521,7 @@ def test_a_room_that_moves_though_it_was_steadied_is_before_a_camera_that_does(
     monkeypatch.setattr(prepare, "coming_in", lambda sight, off: ONE)
     monkeypatch.setattr(sight.Sight, "room", lambda self, what: asked.append(what) or share)
     monkeypatch.setattr(prepare.footage, "check", lambda frames, cuts: seen)
-    monkeypatch.setattr(prepare, "lay", lambda tracks, scene, mirror: "laid")
+    monkeypatch.setattr(prepare, "lay", lambda tracks, scene, mirror, alike: "laid")
     if moves:
         with pytest.raises(Unusable, match=r"^the camera moves; put it on a stand"):
             follow(prepared(), Choices())

@@ -142,13 +142,13 @@ def test_what_goes_away_from_an_arm_at_the_side_is_pushed_wherever_the_tip_was_s
             pushed(**told, width=0)
 
 
-def hand(ahead, sure):
+def hand(ahead, sure, alike=None):
     """Check a tip that is so much ahead, in parts of the way, at the 21 steps of a push, and so
     surely seen."""
     t, thing = 0.04 * np.arange(21), np.stack([5.0 * np.arange(21), np.full(21, 50.0)], 1)
     ahead, sure = np.broadcast_to(ahead, 21), np.broadcast_to(sure, 21)
     tip = thing + 100 * np.stack([ahead, 0 * ahead], 1)
-    check_hand(Tracks(t, tip, thing, sure, sure, 100), t, thing, np.array([100.0, 0.0]))
+    check_hand(Tracks(t, tip, thing, sure, sure, 100), t, thing, np.array([100.0, 0.0]), alike)
 
 
 @pytest.mark.parametrize(("surest", "usable"), [(0.49, False), (0.5, True)])
@@ -174,6 +174,18 @@ def test_an_arm_hides_what_its_tip_is_in_front_of_as_far_as_its_places_are_sure(
     hand(0.17, 1.0)
     with pytest.raises(Unusable, match="and hides it"):
         hand(0.19, 1.0)
+
+
+def test_nothing_hides_what_looks_like_itself_all_along():
+    """Fingers are about a thing that they push, and their tip may be found in front of it."""
+    asked = []
+    hand(0.19, 1.0, lambda *when: asked.append(when) or 0.7)
+    assert np.allclose(asked, [(0, 0.8)])  # s, from the touch until it is there
+    with pytest.raises(Unusable, match="and hides it"):
+        hand(0.19, 1.0, lambda *when: 0.69)
+    with pytest.raises(Unusable, match="not surely seen"):
+        hand(0.19, 0.4, lambda *when: 1.0)
+    hand(0.17, 1.0, pytest.fail)
 
 
 @pytest.mark.parametrize(

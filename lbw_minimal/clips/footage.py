@@ -20,8 +20,8 @@ from lbw_minimal.clips.motion import MOVED, MOVED_SHARE, SMALL, before_backgroun
 from lbw_minimal.clips.paths import LEAST_FRAMES, SIDE_ON, Unusable
 from lbw_minimal.training import quantity
 
-# Of the longer side: the way of the picture's corners. Below the first a camera stands, above the
-# second near and far things move apart, and no fit undoes it.
+# Of the width, across which a task goes: the way of the picture's corners. Below the first a camera
+# stands, above the second near and far things move apart, and no fit undoes it.
 TREMBLES, MOVES = 0.005, 0.11
 LARGE = 0.015  # of the picture: less that moves is no arm
 EDGE = 3  # pixels from the picture's edge, over which an arm comes in
@@ -81,8 +81,8 @@ def _still(moves):
 
 def _steadied(frames, shots, longest):
     """The frames, steadied if the camera trembles in the longest shot, and a warning then."""
-    sways = [camera.sway(frames[first:last]) for first, last in shots]
-    way = camera.extent(sways[longest], *frames.shape[1:3])
+    sways, (height, width) = [camera.sway(frames[a:b]) for a, b in shots], frames.shape[1:3]
+    way = camera.extent(sways[longest], height, width) * max(height, width) / width
     if way > MOVES:
         raise Unusable(*CAMERA)
     if way <= TREMBLES:

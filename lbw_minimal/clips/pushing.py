@@ -6,6 +6,8 @@ away from the arm, it is reached before it goes, the hand stays behind it, and t
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from lbw_minimal.clips.paths import (
@@ -21,12 +23,20 @@ from lbw_minimal.clips.paths import (
     median3,
 )
 
+# How much the object looks like itself between two times, in s, 0 to 1, see `hiding.alike`; None
+# where nobody can say.
+Alike = Callable[[float, float], float] | None
+
 FILM_ON = "film on until all is done and rests"
 LIFTED = 0.2  # of its way: what leaves the straight line by more was picked up
 AHEAD = 0.25  # of its way: a tip so far in front of the object does not push it
 # Of its way, in the middle: where fingers are about a thing their tip was found up to 0.16 ahead of
 # it, and where an arm hides it mostly 0.2 to 0.5.
 HIDES = 0.18
+# Correlation of a thing on its way with how it looked before, as `hiding.alike` has it: what looks
+# so much like itself is in sight, wherever the tip was found. Of a real cube among fingers it was
+# 0.92 or more, of hidden things 0.5 at most.
+IN_SIGHT = 0.7
 SIDEWAYS = 0.25  # of the width: an arm that comes in farther inside comes from above
 # Of the width: an arm that comes in so far ahead of its hand, as the object goes, pulls with it. Of
 # usable clips it was 0.06 at most, of two in which a hand hooks the object 0.18 and 0.38.
@@ -144,9 +154,15 @@ def is_hand(apart: np.ndarray, along: np.ndarray, side: int) -> bool:
     return bool((glued or at_hand) and along[1] > COMES_DOWN * length)
 
 
-def check_hand(tracks: Tracks, t: np.ndarray, thing: np.ndarray, along: np.ndarray) -> None:
+def check_hand(
+    tracks: Tracks,
+    t: np.ndarray,
+    thing: np.ndarray,
+    along: np.ndarray,
+    alike: Alike = None,
+) -> None:
     """Raise Unusable where the arm hides the object: while it moves the tip is never surely seen,
-    or is in front of it.
+    or is in front of it, and the object does not look like itself.
 
     t (N,) s, thing (N, 2): the object's pixels from the touch until it is there; along (2,): its
     way.
@@ -162,7 +178,8 @@ def check_hand(tracks: Tracks, t: np.ndarray, thing: np.ndarray, along: np.ndarr
     ahead = (tip - thing) @ along / (along @ along)  # (N,) of the way; the tip pushes from behind
     order = np.argsort(ahead)
     counted = np.cumsum(sure[order])  # where a tip is hardly seen, its place counts little
-    if ahead[order][np.searchsorted(counted, counted[-1] / 2)] > HIDES:
+    before = ahead[order][np.searchsorted(counted, counted[-1] / 2)] > HIDES
+    if before and (alike is None or alike(t[0], t[-1]) < IN_SIGHT):
         raise Unusable(
             "the arm is between the object and the camera, and hides it",
             "push it from behind, with the hand between it and the edge of the picture",

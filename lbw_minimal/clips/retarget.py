@@ -35,6 +35,7 @@ from lbw_minimal.clips.paths import (
     trusted,
     unsure,
 )
+from lbw_minimal.clips.pushing import Alike
 from lbw_minimal.clips.used import left_out, sliver
 
 FPS = 25  # steps a second of the motion, as in the tasks
@@ -88,7 +89,7 @@ class Motion:
     warnings: list[str] = field(default_factory=list)  # what may spoil the result
 
 
-def lay(tracks: Tracks, scene: Scene, mirror: bool | None = None) -> Motion:
+def lay(tracks: Tracks, scene: Scene, mirror: bool | None = None, alike: Alike = None) -> Motion:
     """The clip's motion in the scene; mirror: None leaves it to the clip.
 
     Raises Unusable if the clip does not show the task, or not so that it can be laid there.
@@ -132,7 +133,7 @@ def lay(tracks: Tracks, scene: Scene, mirror: bool | None = None) -> Motion:
     x = apply(A, tip)  # (N, 2) m
     if touched:
         warnings += pushing.check_way(tracks, tip, thing, way, (i, j), (start, end))
-        pushing.check_hand(tracks, t[i : j + 1], thing[i : j + 1], end - start)
+        pushing.check_hand(tracks, t[i : j + 1], thing[i : j + 1], end - start, alike)
         if not scene.hit:  # a hit thing may go far while it is a blur
             pushing.check_steps(seen, start, end)
         x, object_ = _push(x, way, scene, warnings)

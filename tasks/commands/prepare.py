@@ -25,7 +25,7 @@ from lbw_minimal.clips import arms, footage, light, screen, vanished
 from lbw_minimal.clips.behind import behind
 from lbw_minimal.clips.decoding import check_file
 from lbw_minimal.clips.detector import Detector, Found, refine
-from lbw_minimal.clips.hiding import unlike
+from lbw_minimal.clips.hiding import alike, unlike
 from lbw_minimal.clips.motion import small, some
 from lbw_minimal.clips.outline import reaching
 from lbw_minimal.clips.page import clip_column, write_page
@@ -220,7 +220,7 @@ def follow(result: Prepared, choices: Choices) -> Motion:
         f"{len(frames)} frames at {rate:.3g} a second; their motion was smoothed and taken at "
         f"{FPS} a second, by the time stamps."
     )
-    motion = lay(tracks, result.scene, choices.mirror)
+    motion = lay(tracks, result.scene, choices.mirror, partial(alike, frames, tracks))
     if not choices.tip:
         result.tracks, motion = behind(tracks, motion, result.scene, choices.mirror)
     if unplaced:
