@@ -376,6 +376,16 @@ def test_a_shot_is_asked_by_its_pixels_and_its_room_only_if_it_was_steadied():
     assert sight.room(steadied._replace(warnings=[])) == 0
 
 
+@pytest.mark.parametrize("gone", [False, True])
+@pytest.mark.parametrize("same", [False, True])
+def test_a_shot_is_unmoved_where_its_ends_are_the_same_or_nothing_has_left(gone, same):
+    """A hand may stay, in pieces that reach over no edge: the ends differ, and nothing went."""
+    sight = Sight(None, np.zeros((9, 84, 84, 3), np.uint8))
+    sight.vanished = "a thing" if gone else None
+    ends = Footage(sight.frames, [], slice(0, 9), np.zeros((9, 84, 84)), same)
+    assert sight.unmoved(ends) == (same or not gone)
+
+
 # As the shipped detector sees them
 
 

@@ -53,7 +53,7 @@ class Tracks:
     side: int  # pixels, the shorter side of the frames
     cuts: tuple[int, ...] = ()  # frames at which the picture changes all at once
     enters: float = np.nan  # where the arm comes in, 0 at the left edge, 1 at the right
-    unmoved: bool = False  # whether the last frames look as the first ones, but for the arm
+    unmoved: bool = False  # whether nothing has left its place by the end, as far as is seen
     # what the user placed: "tip" or "object", and from when to when, in s
     yours: tuple[tuple[str, float, float], ...] = ()
     width: int = 0  # pixels, of the frames; 0 if unknown
@@ -255,7 +255,7 @@ def trusted(tracks: Tracks, name: str) -> tuple[np.ndarray, np.ndarray]:
             raise Unusable("the object never moves, what may be it stands at one place", NEARER)
         if tracks.unmoved:
             raise Unusable(
-                "the object never moves, as far as is seen: in the end only the arm differs", NEARER
+                "the object never moves, as far as is seen: nothing has left its place", NEARER
             )
         raise Unusable(
             f"the object is seen in {sure.mean():.0%} of the frames, and hidden or too small else",

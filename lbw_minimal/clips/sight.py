@@ -50,6 +50,11 @@ class Sight:
         """What has left its place by the end."""
         return vanished(self.frames)
 
+    def unmoved(self, seen: Footage) -> bool:
+        """Whether nothing has left its place by the end, as far as is seen: the last frames look as
+        the first ones, but for what comes in, or nothing that stood is gone."""
+        return seen.unmoved or self.vanished is None
+
     def room(self, seen: Footage) -> float:
         """By how much the room moves though it was steadied, see `arms.room`; 0 if it was not."""
         return arms.room(some(self.whole.arms), seen.off) if seen.warnings else 0.0

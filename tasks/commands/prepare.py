@@ -201,7 +201,7 @@ def follow(result: Prepared, choices: Choices) -> Motion:
     result.light = partial(result.light, sure=found.tip_sure[seen.shot])
     tracks = Tracks(
         clip.times, found.tip, found.object, found.tip_sure, found.object_sure,
-        min(height, width), tuple(clip.cuts), arm.enters, seen.unmoved, width=width,
+        min(height, width), tuple(clip.cuts), arm.enters, longest.unmoved(seen), width=width,
     )  # fmt: skip
     tracks = tracks.marked("tip", list(choices.tip)).marked("object", list(choices.object))
     result.tracks, result.notes = tracks, result.notes + [choices.placed] * bool(choices.placed)
