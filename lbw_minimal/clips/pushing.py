@@ -35,7 +35,7 @@ AHEAD = 0.25  # of its way: a tip so far in front of the object does not push it
 HIDES = 0.18
 # Correlation of a thing on its way with how it looked before, as `hiding.alike` has it: what looks
 # so much like itself is in sight, wherever the tip was found. Of a real cube among fingers it was
-# 0.92 or more, of hidden things 0.5 at most.
+# 0.92 or more, of hidden things mostly 0.5 or less, and 0.75 of one that was seen in part.
 IN_SIGHT = 0.7
 SIDEWAYS = 0.25  # of the width: an arm that comes in farther inside comes from above
 # Of the width: an arm that comes in so far ahead of its hand, as the object goes, pulls with it. Of
