@@ -11,8 +11,11 @@ import pytest
 
 import tasks
 from lbw_minimal import video
+from lbw_minimal.clips.lookalike import look_alike
 from tasks.__main__ import main
+from tasks.commands.prepare import prepare
 from tasks.commands.stage import _contours, outlines, page
+from tasks.world import record_expert
 
 
 def box(polygons):
@@ -101,17 +104,16 @@ def test_on_a_phone_the_command_breaks_before_the_path_alone(tmp_path):
     assert 0 < command == path < 40 and wide <= 390
 
 
-@pytest.mark.skipif(not browser.CHROMIUM, reason="needs Chromium")
-def test_a_browser_records_what_its_camera_sees(tmp_path):
-    """A file stands in for the camera: a white square that goes right, 640 x 360. The stage has the
-    camera's shape, so that no outline lies beside the picture."""
+def recorded(tmp_path, film, seconds):
+    """What a browser records on push's stage, of a camera for which a film (T, H, W, 3) uint8 at 25
+    frames a second stands in, over and over: the file. The stage has the camera's shape, so that no
+    outline lies beside the picture."""
     (tmp_path / "push.html").write_text(page("push"), encoding="utf-8")
-    film = np.full((25, 360, 640, 3), 90, np.uint8)
-    for t, frame in enumerate(film):
-        frame[200:260, 120 + 14 * t : 180 + 14 * t] = 240
+    height, width = film.shape[1:3]
     yuv = (cv2.cvtColor(frame, cv2.COLOR_RGB2YUV_I420).tobytes() for frame in film)
     (tmp_path / "camera.y4m").write_bytes(
-        b"YUV4MPEG2 W640 H360 F25:1 Ip A1:1 C420\n" + b"".join(b"FRAME\n" + f for f in yuv)
+        f"YUV4MPEG2 W{width} H{height} F25:1 Ip A1:1 C420\n".encode()
+        + b"".join(b"FRAME\n" + f for f in yuv)
     )
     camera = ("--use-fake-device-for-media-stream", "--use-fake-ui-for-media-stream",
               f"--use-file-for-fake-video-capture={tmp_path / 'camera.y4m'}")  # fmt: skip
@@ -130,10 +132,10 @@ def test_a_browser_records_what_its_camera_sees(tmp_path):
     async def record():
         async with browser.opened(tmp_path / "push.html", tmp_path / "profile", *camera) as shown:
             await shown.until(state, "live")
-            assert await shown.js(shape) == pytest.approx([16 / 9, 16 / 9], rel=0.01)
+            assert await shown.js(shape) == pytest.approx([width / height] * 2, rel=0.01)
             await shown.js(click.format("record"))
             await shown.until(state, "recording")
-            await asyncio.sleep(3)
+            await asyncio.sleep(seconds)
             await shown.js(click.format("stop"))
             await shown.until(state, "recorded")
             name = await shown.js("document.getElementById('save').download")
@@ -145,9 +147,30 @@ def test_a_browser_records_what_its_camera_sees(tmp_path):
     name, data = asyncio.run(record())
     assert re.fullmatch(r"push-clip\.(mp4|webm)", name)
     (tmp_path / name).write_bytes(data)
-    frames = video.read(tmp_path / name)[0]
+    return tmp_path / name
+
+
+@pytest.mark.skipif(not browser.CHROMIUM, reason="needs Chromium")
+def test_a_browser_records_what_its_camera_sees(tmp_path):
+    """A white square that goes right."""
+    film = np.full((25, 360, 640, 3), 90, np.uint8)
+    for t, frame in enumerate(film):
+        frame[200:260, 120 + 14 * t : 180 + 14 * t] = 240
+    frames = video.read(recorded(tmp_path, film, 3))[0]
     places = [np.argwhere(frame.mean(-1) > 180).mean(0) for frame in frames]
     assert len(frames) > 20 and np.ptp(places, axis=0)[1] > 40 > 5 > np.ptp(places, axis=0)[0]
+
+
+@pytest.mark.skipif(not browser.CHROMIUM, reason="needs Chromium")
+def test_prepare_takes_what_a_browser_recorded(tmp_path):
+    """A look-alike of an arm that pushes. It comes again and again, and so the recording jumps."""
+    env = tasks.bare("push", embodiment="human")
+    clip = look_alike(*record_expert(env, 3)[:2])
+    env.close()
+    t = np.arange(0, clip.times[-1], 0.04)
+    film = clip.frames[np.abs(clip.times - t[:, None]).argmin(1)]
+    result = prepare("push", recorded(tmp_path, film, 2 * t[-1]))
+    assert not result.why_not and result.film.shape[1:] == (84, 84, 3)
 
 
 def test_an_outline_has_no_specks():
